@@ -1,0 +1,1 @@
+"""What several models share: float32-safe elementary functions, quadrature, Fresnel terms."""

@@ -1,0 +1,40 @@
+"""Fixed quadrature rules: a constant number of nodes makes an integral noise-free and differentiable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+
+@cache
+def gauss_legendre(n: int) -> tuple[list[float], list[float]]:
+    """Nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    return list(map(float, (x + 1) / 2)), list(map(float, w / 2))
+
+
+def integrate(f: Callable[[Any], tuple], n: int, like: Any) -> tuple:
+    """Integrals over [0, 1] of the functions that ``f`` returns as a tuple, by ``n`` Gauss-Legendre nodes.
+
+    ``like`` is a number of the type that ``f`` takes and returns. With Dr.Jit arrays this records one loop instead of
+    ``n`` copies of ``f``: kernels compile ten times faster and run as fast.
+    """
+    nodes, weights = gauss_legendre(n)
+    if not dr.is_jit_v(like):
+        terms = [[weight * value for value in f(node)] for node, weight in zip(nodes, weights)]
+        return tuple(map(sum, zip(*terms)))
+    Float = type(like)  # noqa: N806
+    nodes, weights = Float(nodes), Float(weights)
+
+    def add(index, *totals):
+        weight = dr.gather(Float, weights, index)
+        return index + 1, *(total + weight * value for total, value in zip(totals, f(dr.gather(Float, nodes, index))))
+
+    index = dr.uint32_array_t(Float)(0)
+    count = len(f(Float(0.5)))
+    start = (index, *(dr.zeros(Float, dr.width(like)) for _ in range(count)))
+    return dr.while_loop(start, lambda index, *_: index < n, add, max_iterations=n)[1:]

@@ -1,0 +1,148 @@
+"""Lambertian grains, integrated over their normals without noise (Lucas et al. 2024, Eq. 21).
+
+With m' on the unit hemisphere of sphere space, at height h and azimuth x, Eq. 21 becomes
+
+    tau_0 f_d cos_o = K_d / pi * r / i'_z * int_0^1 dh exp(-r (pi (1 - h^2) + U(h)))
+                      int dx (i' . m')+ (E o . m')+ T / |E m'|,
+
+where the area U of the shadows does not depend on x. Replacing U by the shadow along i alone, and dropping K_d and T,
+gives the density of this way to sample: a visible normal first, then the cosine lobe about it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import drjit as dr
+
+from ...microfacet.quadrature import gauss_legendre, integrate
+from .grains import exposure
+from .shadows import shadow, to_sphere
+
+HEIGHTS, AZIMUTHS = 16, 8
+"""Nodes. Against 300 nodes, over 20 000 random parameters and directions (cosines >= 0.03, a third near retro), the
+relative error is 0.02 % in the mean, under 0.46 % in 99.9 % and under 0.35 % wherever the value exceeds 0.05; the worst,
+0.9 %, are back-lit directions of value 0.001. Eight nodes reach 3 % there, hence not fewer."""
+
+
+class Integral(NamedTuple):
+    """f_d cos_o for albedo 1, shared out to the two albedos that a grain may have, and the sampling density."""
+
+    first: Any
+    second: Any
+    pdf: Any
+
+
+def lambertian(
+    r,
+    beta_x,
+    beta_y,
+    wi,
+    wo,
+    shaded: Callable,
+    *,
+    closed: bool,
+    share: Callable | None = None,
+    transmittance: Callable | None = None,
+) -> Integral:
+    """Integrate Lambertian grains seen from ``wi`` and lit from ``wo``, both above the surface (Lucas 2024, Eq. 21).
+
+    ``pdf`` is not normalised: it integrates to the visible fraction tau_i, less what goes below the horizon.
+
+    Parameters
+    ----------
+    shaded(i, o, h, shadow_i, shadow_o) : area of the shadows at height h, by the choice of masking
+    closed : the azimuth has a closed form; needs beta_x = beta_y, no coat, and a share that varies with height only
+    share(h, m) : of the second albedo at height h and normal m (None if closed), in [0, 1]
+    transmittance(cos_i, cos_o) : of a grain's dielectric coat, for local cosines
+    """
+    i, o = to_sphere(wi, beta_x, beta_y), to_sphere(wo, beta_x, beta_y)
+    stretch_o = dr.sqrt(dr.square(beta_x * wo.x) + dr.square(beta_y * wo.y) + dr.square(wo.z))  # |E o|
+    azimuth = _Azimuth(i, o)
+
+    def at_height(t):
+        h, jacobian = 1 - (1 - t) ** 3, 3 * (1 - t) ** 2  # crowded at the top, which alone is seen at grazing
+        shadow_i, shadow_o = shadow(i, h), shadow(o, h)
+        if closed:
+            lit = azimuth.product(h) * dr.rsqrt(dr.square(beta_x) * (1 - h * h) + h * h)
+            second = share(h, None) * lit if share else 0 * lit
+            value = lit
+        else:
+            value, second, lit = at_azimuths(h)
+        exposed = jacobian * exposure(r, h, shaded(i, o, h, shadow_i, shadow_o))
+        visible = jacobian * exposure(r, h, shadow_i.area)
+        return exposed * (value - second), exposed * second, visible * lit
+
+    def at_azimuths(h):
+        value, second, lit = 0, 0, 0
+        for m, cosines, width in azimuth.nodes(h):
+            m = type(wi)(beta_x * m.x, beta_y * m.y, m.z)
+            length = dr.rsqrt(dr.squared_norm(m))
+            m, term = m * length, width * cosines * length
+            through = transmittance(dr.dot(wi, m), dr.dot(wo, m)) * term if transmittance else term
+            value, lit = value + through, lit + term
+            second = second + share(h, m) * through if share else 0 * through
+        return value, second, lit
+
+    first, second, pdf = integrate(at_height, HEIGHTS, r * wi.z)
+    scale = r * stretch_o / (dr.pi * i.z)
+    return Integral(scale * first, scale * second, scale * pdf)
+
+
+class _Azimuth:
+    """The lit azimuths of a grain at one height: where (i'.m')+ (o'.m')+ is positive, x counted from i towards o."""
+
+    def __init__(self, i, o):
+        self.i, self.o = i, o
+        self.radius_i, self.radius_o = (dr.sqrt(w.x * w.x + w.y * w.y + 1e-14) for w in (i, o))
+        cross = i.x * o.y - i.y * o.x
+        self.turn = dr.select(cross < 0, -1.0, 1.0)
+        self.between = dr.atan2(dr.abs(cross), i.x * o.x + i.y * o.y + 1e-20)
+        self.sin_between, self.cos_between = dr.sincos(self.between)
+
+    def arcs(self, h):
+        """Start and end of the two lit arcs; the second one is there when light comes from behind, else it is empty."""
+        radius = dr.safe_sqrt(1 - h * h)
+
+        def half_width(w, length):  # of the arc with w.m' = w_z h + length radius cos(x) > 0
+            a, b = w.z * h, length * radius
+            return dr.atan2(dr.safe_sqrt(b * b - a * a), -a)
+
+        lit_i, lit_o = half_width(self.i, self.radius_i), half_width(self.o, self.radius_o)
+        start, end = dr.maximum(-lit_i, self.between - lit_o), dr.minimum(lit_i, self.between + lit_o)
+        yield start, dr.maximum(start, end)
+        yield -lit_i, dr.maximum(-lit_i, dr.minimum(lit_i, self.between + lit_o - 2 * dr.pi))
+
+    def product(self, h):
+        """Integral of (i'.m')+ (o'.m')+ over the azimuth, in closed form."""
+        radius = dr.safe_sqrt(1 - h * h)
+        a_i, b_i, a_o, b_o = self.i.z * h, self.radius_i * radius, self.o.z * h, self.radius_o * radius
+
+        def primitive(x):
+            sin, cos = dr.sincos(x)
+            sin_o = sin * self.cos_between - cos * self.sin_between  # sin(x - between)
+            cos_o = cos * self.cos_between + sin * self.sin_between
+            return (
+                a_i * a_o * x
+                + a_i * b_o * sin_o
+                + a_o * b_i * sin
+                + b_i * b_o / 2 * (x * self.cos_between + (sin * cos_o + cos * sin_o) / 2)
+            )
+
+        return dr.maximum(sum(primitive(end) - primitive(start) for start, end in self.arcs(h)), 0)
+
+    def nodes(self, h):
+        """(m', (i'.m') (o'.m'), weight) at the nodes of a Gauss-Legendre rule on either lit arc."""
+        radius = dr.safe_sqrt(1 - h * h)
+        forward_x, forward_y = self.i.x / self.radius_i, self.i.y / self.radius_i
+        forward_x = dr.select(self.radius_i > 1e-6, forward_x, 1)
+        for start, end in self.arcs(h):
+            for t, weight in zip(*gauss_legendre(AZIMUTHS)):
+                sin, cos = dr.sincos(start + t * (end - start))
+                sin *= self.turn
+                m = type(self.i)(
+                    radius * (cos * forward_x - sin * forward_y), radius * (cos * forward_y + sin * forward_x), h
+                )
+                cosines = dr.maximum(dr.dot(self.i, m), 0) * dr.maximum(dr.dot(self.o, m), 0)
+                yield m, cosines, weight * (end - start)

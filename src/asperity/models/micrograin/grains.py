@@ -1,0 +1,102 @@
+"""The statistics of Poisson-distributed half-ellipsoidal grains: how much of which normal is exposed and visible.
+
+In sphere space (see `shadows`) the grains are unit hemispheres of density r, and a point at height h has the normal
+m' with m'_z = h. ``r`` is the density in sphere space, ``tau_0`` the filling factor.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+
+from ...microfacet.numerics import log1p, one_minus_exp
+from .shadows import inclination, silhouette
+
+
+def density(tau_0):
+    """Grains per unit area of sphere space, r = -log(1 - tau_0) / pi (Lucas 2024, Eq. 8), for tau_0 in [0, 1].
+
+    tau_0 = 1 would need infinitely many grains; it stands for 1 - 1e-6.
+    """
+    return -log1p(-dr.minimum(tau_0, 1 - 1e-6)) / dr.pi
+
+
+def exposure(r, h, shaded):
+    """Share of the plane at height ``h`` that no grain covers or shades: exp(-r (pi (1 - h^2) + shaded))."""
+    return dr.exp(-r * (dr.pi * (1 - h * h) + shaded))
+
+
+def normal_in_sphere_space(m, beta_x, beta_y):
+    """(height h' = m'_z, D_ggx(m)) of a unit normal ``m``; h' is the height on the grain whose normal is m.
+
+    With D_ggx of roughness (beta_x, beta_y), the micrograin NDF of Lucas 2024, Eq. 12 is
+    tau_0 D(m) = pi r exp(-r pi (1 - h'^2)) D_ggx(m); it is used in this product only, which has no 0/0 at tau_0 = 0.
+    """
+    stretch = dr.square(m.x / beta_x) + dr.square(m.y / beta_y) + dr.square(m.z)
+    return m.z * dr.rsqrt(stretch), dr.rcp(dr.pi * beta_x * beta_y * dr.square(stretch))
+
+
+def visible_fraction(r, w):
+    """Share tau_i of what is seen from direction ``w`` (sphere space) that is grain, not base.
+
+    1 - (1 - tau_0)^((1 + 1/cos) / 2); what Lucas 2024, Eq. 26 approximates.
+    """
+    _, cos = inclination(w)
+    return one_minus_exp(r * (dr.pi / 2) * (1 + 1 / cos))
+
+
+def sample_visible_normal(r, w, u, v):
+    """Point m' on the unit hemisphere that is visible from ``w``, distributed by visible area (all in sphere space).
+
+    The density over normals m is tau_0 D(m) G1dist(w, h') (i.m)+ / (cos_i tau_i). Exact: the area visible above h is
+    the whole shadow sigma_full(w, h) = pi (1 - h^2) + sigma_s(w, h), whose inverse gives the height, and at a given
+    height the azimuth has the density (i'.m')+. Both inversions are two Halley steps. ``u``, ``v`` in [0, 1).
+    """
+    sin, cos = inclination(w)
+    h = _visible_height(r, sin, cos, u)
+    azimuth, radius = _visible_azimuth(sin, cos, h, v), dr.safe_sqrt((1 - h) * (1 + h))
+    sin_azimuth, cos_azimuth = dr.sincos(azimuth)
+    x, y = w.x / sin, w.y / sin
+    toward = dr.select(sin > 1e-6, x * cos_azimuth - y * sin_azimuth, cos_azimuth)
+    aside = dr.select(sin > 1e-6, y * cos_azimuth + x * sin_azimuth, sin_azimuth)
+    return type(w)(radius * toward, radius * aside, h)
+
+
+def _visible_height(r, sin, cos, u):
+    """Invert 1 - exp(-r sigma_full(h)) = u tau_i for the height h in [0, 1]."""
+    whole = dr.pi / 2 * (1 + 1 / cos)  # sigma_full at h = 0
+    shaded = -log1p(-u * one_minus_exp(r * whole)) / dr.maximum(r, 1e-12)
+    # Above h = sin the shadow is the disc itself; below, the silhouette's angle alpha is the unknown, h = sin cos(alpha).
+    top = dr.pi * cos * cos
+    q = dr.clip((shaded - top) / dr.maximum(whole - top, 1e-12), 0, 1)
+    alpha = dr.pi / 2 * (cos * dr.sqrt(q) + (1 - cos) * dr.power(q + 1e-20, 1 / 3))
+    for _ in range(2):
+        sin_alpha, cos_alpha = dr.sincos(alpha)
+        h = sin * cos_alpha
+        gamma = dr.atan2(sin_alpha, cos * cos_alpha + 1e-20)
+        f = (dr.pi - gamma) * (1 - h * h) + (alpha - h * sin * sin_alpha) / cos - shaded
+        width = 2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha)  # M, with sigma_full' = -M / cos
+        gamma_slope = cos / (dr.square(sin_alpha) + dr.square(cos * cos_alpha) + 1e-20)
+        width_slope = 2 * (sin * cos_alpha - cos * sin * sin_alpha * (dr.pi - gamma) - cos * h * gamma_slope)
+        slope = width / cos * sin * sin_alpha
+        bend = sin / cos * (width_slope * sin_alpha + width * cos_alpha)
+        step = 2 * f * slope / dr.maximum(2 * slope * slope - f * bend, 1e-20)
+        alpha = dr.clip(alpha - step, 0, dr.pi / 2)
+    return dr.select(shaded <= top, dr.safe_sqrt(1 - shaded / dr.pi), sin * dr.cos(alpha))
+
+
+def _visible_azimuth(sin, cos, h, v):
+    """Azimuth about ``w`` with density proportional to (a + b cos x)+, a = cos h, b = sin sqrt(1 - h^2)."""
+    a, b = cos * h, sin * dr.safe_sqrt((1 - h) * (1 + h))
+    _, sin_alpha, gamma = silhouette(sin, cos, dr.minimum(h / sin, 1))
+    limit = dr.pi - gamma
+    side, v = dr.select(v < 0.5, -1.0, 1.0), dr.abs(2 * v - 1)
+    target = v * (a * limit + sin * sin_alpha)
+    # Where a < b the density vanishes linearly at the limit, so the distribution ends in a square root.
+    x = limit * (1 - dr.sqrt(1 - v))
+    for _ in range(2):
+        sin_x, cos_x = dr.sincos(x)
+        f = a * x + b * sin_x - target
+        slope, bend = dr.maximum(a + b * cos_x, 0), -b * sin_x
+        step = 2 * f * slope / dr.maximum(2 * slope * slope - f * bend, 1e-20)
+        x = dr.clip(x - step, 0, limit)
+    return side * x

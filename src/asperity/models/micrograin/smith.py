@@ -1,0 +1,59 @@
+"""Grains with Smith's masking: heights independent of normals, and of each other (Lucas et al. 2023).
+
+The published baseline of the micrograin model, as Lucas 2024 recalls it in Eq. 1 to 6. Two of its pieces are not printed
+there and were filled in: the masking function follows from Smith's condition that the visible normals project to the
+whole surface, and the transmission T of a coated grain is taken for the macroscopic angles.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+
+from ...microfacet.numerics import one_minus_exp
+from ...microfacet.quadrature import integrate
+from .grains import exposure, visible_fraction
+from .shadows import GRAZING, inclination, silhouette
+
+HEIGHTS = 12
+
+
+def filling_factor(r):
+    """tau_0, kept off zero: the NDF divides by it."""
+    return dr.maximum(one_minus_exp(dr.pi * r), 1e-7)
+
+
+def masking(r, w):
+    """G1(w) = cos / int D(m) (w.m)+ dm, for ``w`` in sphere space."""
+    sin, cos = inclination(w)
+
+    def width(h):  # int (w.m')+ over the azimuth, of what is exposed at height h
+        _, sin_alpha, gamma = silhouette(sin, cos, dr.minimum(h / sin, 1))
+        return (2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha) * exposure(r, h, 0),)
+
+    (projected,) = integrate(width, HEIGHTS, r * cos)
+    return dr.minimum(cos * filling_factor(r) / (dr.maximum(r, 1e-7 / dr.pi) * projected), 1)
+
+
+def grain_weight(r, i, o):
+    """w+(i, o), the share of the grains among what both directions see (Lucas 2023; 2024, Eq. 4)."""
+    return 1 - pore_weight(r, i, o)
+
+
+def pore_weight(r, i, o):
+    """1 - w+(i, o) = (1 - tau_i) (1 - tau_o) / (1 - tau_0)."""
+    return (1 - visible_fraction(r, i)) * (1 - visible_fraction(r, o)) * dr.exp(dr.pi * r)
+
+
+def sample_visible_normal(w, u, v):
+    """Visible normal of GGX in sphere space, w' = ``w`` (Dupuy and Benyoub 2023): a cap of the sphere, reflected."""
+    z = dr.fma(1 - u, 1 + w.z, -w.z)
+    radius = dr.safe_sqrt((1 - z) * (1 + z))
+    sin, cos = dr.sincos(2 * dr.pi * v)
+    m = type(w)(radius * cos + w.x, radius * sin + w.y, dr.maximum(z + w.z, GRAZING**2))
+    return m * dr.rsqrt(dr.squared_norm(m))
+
+
+def visible_masking(w):
+    """G1 of GGX for ``w`` in sphere space."""
+    _, cos = inclination(w)
+    return 2 / (1 + 1 / cos)

@@ -1,0 +1,414 @@
+"""How a model declares its parameters, once.
+
+A declaration is a class attribute of the model. From it come parsing, error messages, ``mi.traverse``, the tables of
+``asperity show`` and the documentation. On a model that a scene has loaded, the attribute holds the parsed value: a
+``mi.Texture``, a nested ``mi.BSDF``, or a plain Python value.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+
+class ParameterError(ValueError):
+    """A parameter is unknown, of the wrong type, out of its range, or at odds with another one."""
+
+
+def nearest(name: str, allowed: Iterable[str]) -> str:
+    """Say which of ``allowed`` the user may have meant, or list them all."""
+    allowed = sorted(allowed)
+    match = difflib.get_close_matches(name, allowed, n=1)
+    return f"did you mean {match[0]!r}?" if match else f"allowed: {', '.join(allowed)}."
+
+
+class Row(NamedTuple):
+    """One line of a model's parameter table."""
+
+    name: str
+    kind: str
+    default: str
+    allowed: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A declared parameter; ``meaning`` is its one-line documentation, ``name`` that of the class attribute."""
+
+    meaning: str
+    default: Any = None
+    name: str = field(default="", init=False)
+    kind: ClassVar[str] = ""
+    unit: ClassVar[str] = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        object.__setattr__(self, "name", name)
+
+    def names(self) -> tuple[str, ...]:
+        """Names that a scene may give for this parameter."""
+        return (self.name,)
+
+    def allowed(self) -> str:
+        """Range or set of values, for tables and messages."""
+        return ""
+
+    def parse(self, props: mi.Properties) -> Any:
+        """Value from a scene's properties, or the default; raises ParameterError."""
+        raise NotImplementedError
+
+    def children(self, value: Any) -> Mapping[str, Any]:
+        """What ``mi.traverse`` shall find in the parsed value: textures and nested BSDFs by name."""
+        return {self.name: value} if isinstance(value, mi.Object) else {}
+
+    def check(self, value: Any) -> None:
+        """Raise ParameterError if the parsed value, perhaps updated since, is out of range."""
+
+    def rows(self) -> Iterable[Row]:
+        """Lines of the parameter table."""
+        default = "-" if self.default is None else str(self.default)
+        yield Row(self.name, self.kind, default, self.allowed(), self.unit, self.meaning)
+
+    def wrong(self, name: str, given: str, where: str = "") -> ParameterError:
+        """An error that names the parameter, what was given, and what is allowed."""
+        within = f" in {self.allowed()}" if self.allowed() else ""
+        return ParameterError(f"{name} = {given}{where}: expected a {self.kind}{within}.")
+
+
+@dataclass(frozen=True)
+class Texture(Parameter):
+    """A number in a range, constant or from a texture; ``unit`` says what it counts."""
+
+    low: float = 0.0
+    high: float = math.inf
+    open_low: bool = False
+    unit: str = ""  # type: ignore[misc]
+    kind: ClassVar[str] = "number or texture"
+
+    def allowed(self) -> str:
+        """The range as an interval."""
+        return f"{'(' if self.open_low else '['}{self.low:g}, {self.high:g}{')' if math.isinf(self.high) else ']'}"
+
+    def parse(self, props: mi.Properties) -> Any:
+        """A ``mi.Texture``, or None if none is given and there is no default."""
+        if props.has_property(self.name):
+            return self.texture(props, self.name)
+        return None if self.default is None else props.get_unbounded_texture(self.name, self.default)
+
+    def texture(self, props: mi.Properties, name: str) -> Any:
+        """The texture that the scene gives under ``name``, its range checked."""
+        given = props[name]
+        if isinstance(given, (bool, str)) or (isinstance(given, (int, float)) and not self.holds(given)):
+            raise self.wrong(name, repr(given))
+        try:
+            texture = self.get(props, name)
+        except RuntimeError as error:
+            raise self.wrong(name, props.as_string(name)) from error
+        self.check(texture)
+        return texture
+
+    def get(self, props: mi.Properties, name: str) -> Any:
+        """Ask Mitsuba for the texture; unbounded, since a reflectance would be limited to [0, 1]."""
+        return props.get_unbounded_texture(name)
+
+    def holds(self, value: float) -> bool:
+        """Whether a number is in range; NaN and infinity never are."""
+        above = value > self.low if self.open_low else value >= self.low
+        return math.isfinite(value) and above and value <= self.high
+
+    def check(self, value: Any) -> None:
+        """Check every constant and texel that Mitsuba shows."""
+        for key, data in _numbers(value):
+            low, high = data.min(), data.max()
+            if not (self.holds(low) and self.holds(high)):
+                raise self.wrong(self.name, f"{high if self.holds(low) else low:g}", where=f" (in its {key!r})")
+
+
+@dataclass(frozen=True)
+class Colour(Texture):
+    """A reflectance in [0, 1] at each wavelength: number, colour, spectrum or texture."""
+
+    high: float = 1.0
+    kind: ClassVar[str] = "colour or texture"
+
+    def get(self, props: mi.Properties, name: str) -> Any:
+        """Ask Mitsuba for a reflectance."""
+        return props.get_texture(name)
+
+
+@dataclass(frozen=True)
+class Ior(Texture):
+    """A dielectric's index of refraction: a name that Mitsuba knows (``"bk7"``), a number or a texture."""
+
+    low: float = 1.0
+    high: float = 5.0
+    kind: ClassVar[str] = "name, number or texture"
+
+    def parse(self, props: mi.Properties) -> Any:
+        """Names are looked up by Mitsuba."""
+        if isinstance(props.get(self.name, self.default), str):
+            try:
+                props[self.name] = mi.lookup_ior(props, self.name, self.default)
+            except RuntimeError as error:
+                raise ParameterError(f"{self.name} = {props[self.name]!r}: {error}") from error
+        return super().parse(props)
+
+
+@dataclass(frozen=True)
+class Complex:
+    """A conductor's complex index of refraction, per wavelength; ``mirror`` reflects everything instead."""
+
+    eta: Any = None
+    k: Any = None
+    reflectivity: Any = None
+    edge_tint: Any = None
+
+    @property
+    def mirror(self) -> bool:
+        """Whether this is Mitsuba's ``material: "none"``."""
+        return self.eta is None and self.reflectivity is None
+
+    def eval(self, si: mi.SurfaceInteraction3f, active: Any) -> tuple[Any, Any]:
+        """(eta, k) at a surface point."""
+        if self.eta is not None:
+            return self.eta.eval(si, active), self.k.eval(si, active)
+        return artist_friendly(self.reflectivity.eval(si, active), self.edge_tint.eval(si, active))
+
+
+def artist_friendly(reflectivity: Any, edge_tint: Any) -> tuple[Any, Any]:
+    """(eta, k) of the metal that reflects ``reflectivity`` at normal incidence (Gulbrandsen 2014, Eq. 1 to 4).
+
+    ``edge_tint`` in [0, 1] biases the colour at grazing angles. Reflectivity is kept within [0, 0.9999]: at 1, k would
+    be infinite.
+    """
+    r = dr.clip(reflectivity, 0, 0.9999)
+    low, high = (1 - r) / (1 + r), (1 + dr.sqrt(r)) / (1 - dr.sqrt(r))
+    eta = edge_tint * low + (1 - edge_tint) * high
+    return eta, dr.safe_sqrt((r * dr.square(eta + 1) - dr.square(eta - 1)) / (1 - r))
+
+
+@dataclass(frozen=True)
+class Conductor(Parameter):
+    """A metal in one of three ways: ``material``, or ``eta`` and ``k``, or ``reflectivity`` and ``edge_tint``."""
+
+    suffix: str = ""
+    kind: ClassVar[str] = "conductor"
+
+    def names(self) -> tuple[str, ...]:
+        """The five names, with this conductor's suffix."""
+        return tuple(name + self.suffix for name in ("material", "eta", "k", "reflectivity", "edge_tint"))
+
+    def parse(self, props: mi.Properties) -> Any:
+        """A `Complex`, or None if nothing is given and there is no default."""
+        material, eta, k, reflectivity, edge_tint = self.names()
+        ways = [way for way in ((material,), (eta, k), (reflectivity, edge_tint)) if any(map(props.has_property, way))]
+        if len(ways) > 1:
+            raise ParameterError(f"{' and '.join(way[0] for way in ways)} exclude each other: give one metal, one way.")
+        if not ways or ways[0] == (material,):
+            name = props.get(material, self.default)
+            return None if name is None else self._named(name, material)
+        if ways[0] == (eta, k):
+            for name, other in ((eta, k), (k, eta)):
+                if not props.has_property(name):
+                    raise ParameterError(f"{other} is given without {name}: a metal's index needs both.")
+            return Complex(*(_index(name, low).texture(props, name) for name, low in ((eta, 1e-3), (k, 0.0))))
+        if not props.has_property(reflectivity):
+            raise ParameterError(f"{edge_tint} is given without {reflectivity}.")
+        tint = props.get_texture(edge_tint, 0.0) if not props.has_property(edge_tint) else None
+        return Complex(
+            reflectivity=_colour(reflectivity).texture(props, reflectivity),
+            edge_tint=tint or _colour(edge_tint).texture(props, edge_tint),
+        )
+
+    def _named(self, material: Any, name: str) -> Complex:
+        if material == "none":
+            return Complex()
+        if not isinstance(material, str):
+            raise ParameterError(f"{name} = {material!r}: expected the name of a metal, such as 'Au'.")
+        if material not in materials():
+            raise ParameterError(f"{name} = {material!r}: not a material that Mitsuba knows; {nearest(material, materials())}")
+        found = _objects(mi.load_dict({"type": "conductor", "material": material}))
+        return Complex(found["eta"], found["k"])
+
+    def children(self, value: Any) -> Mapping[str, Any]:
+        """The textures of the chosen way."""
+        parts = {} if value is None else vars(value)
+        return {name + self.suffix: texture for name, texture in parts.items() if texture is not None}
+
+    def check(self, value: Any) -> None:
+        """Check the textures of the chosen way."""
+        for name, texture in self.children(value).items():
+            tint = name.startswith(("reflectivity", "edge_tint"))
+            (_colour(name) if tint else _index(name, 0.0)).check(texture)
+
+    def rows(self) -> Iterable[Row]:
+        """A line for each name."""
+        material, eta, k, reflectivity, edge_tint = self.names()
+        default = "-" if self.default is None else self.default
+        yield Row(material, "name", default, 'Mitsuba\'s, or "none"', "", f"{self.meaning}: by name; 'none' is a mirror")
+        yield Row(eta, "spectrum or texture", "-", "> 0", "", f"{self.meaning}: real part of the index, with {k}")
+        yield Row(k, "spectrum or texture", "-", "[0, inf)", "", f"{self.meaning}: extinction, with {eta}")
+        yield Row(reflectivity, "colour or texture", "-", "[0, 1]", "", f"{self.meaning}: by colour at normal incidence")
+        yield Row(edge_tint, "colour or texture", "0", "[0, 1]", "", f"colour bias at grazing, with {reflectivity}")
+
+
+def _index(name: str, low: float) -> Texture:
+    part = Texture("", low=low, high=100.0)
+    part.__set_name__(Texture, name)
+    return part
+
+
+def _colour(name: str) -> Colour:
+    part = Colour("")
+    part.__set_name__(Colour, name)
+    return part
+
+
+@cache
+def materials() -> list[str]:
+    """Names of the conductors that come with Mitsuba, and ``none``."""
+    folder = Path(mi.__file__).parent / "data" / "ior"
+    return ["none", *sorted(path.name.removesuffix(".eta.spd") for path in folder.glob("*.eta.spd"))]
+
+
+@dataclass(frozen=True)
+class Choice(Parameter):
+    """One of a few words; the first is the default."""
+
+    options: tuple[str, ...] = ()
+    kind: ClassVar[str] = "choice"
+
+    def allowed(self) -> str:
+        """The words."""
+        return ", ".join(self.options)
+
+    def parse(self, props: mi.Properties) -> str:
+        """The word, if it is one of the options."""
+        given = props.get(self.name, self.options[0])
+        if given not in self.options:
+            hint = nearest(given, self.options) if isinstance(given, str) else f"allowed: {self.allowed()}."
+            raise ParameterError(f"{self.name} = {given!r}: {hint}")
+        return given
+
+    def rows(self) -> Iterable[Row]:
+        """The default is the first option."""
+        yield Row(self.name, self.kind, self.options[0], self.allowed(), "", self.meaning)
+
+
+@dataclass(frozen=True)
+class Flag(Parameter):
+    """True or false."""
+
+    kind: ClassVar[str] = "true or false"
+
+    def parse(self, props: mi.Properties) -> bool:
+        """The flag; numbers and words are not accepted."""
+        given = props.get(self.name, self.default)
+        if not isinstance(given, bool):
+            raise self.wrong(self.name, repr(given))
+        return given
+
+
+@dataclass(frozen=True)
+class BSDF(Parameter):
+    """A nested BSDF; in XML it may be unnamed."""
+
+    kind: ClassVar[str] = "BSDF"
+
+    def parse(self, props: mi.Properties) -> Any:
+        """The nested plugin, or None."""
+        name = next((n for n in (self.name, *props.keys()) if is_unnamed(n) or props.has_property(self.name)), None)
+        if name is None:
+            return None
+        given = props[name]
+        if not isinstance(given, mi.BSDF):
+            raise self.wrong(self.name, repr(given))
+        return given
+
+
+def is_unnamed(name: str) -> bool:
+    """Whether Mitsuba made up ``name`` for a nested object that has none in the XML."""
+    return name.startswith("_arg_")
+
+
+class Declared:
+    """What reads the declarations of a class; the base of every model.
+
+    A model may define ``configure(given)`` to settle parameters that depend on each other; ``given`` holds the names
+    that the scene gave.
+    """
+
+    @classmethod
+    def declarations(cls) -> list[Parameter]:
+        """The parameters in the order in which the class body names them."""
+        return [value for value in vars(cls).values() if isinstance(value, Parameter)]
+
+    @classmethod
+    def rows(cls) -> list[Row]:
+        """The parameter table."""
+        return [row for parameter in cls.declarations() for row in parameter.rows()]
+
+    @classmethod
+    def parse(cls, props: mi.Properties) -> Declared:
+        """A model with the scene's parameters; raises ParameterError."""
+        declarations = cls.declarations()
+        names = {name for parameter in declarations for name in parameter.names()}
+        given = {name for name in props.keys() if not is_unnamed(name)}  # noqa: SIM118  (Properties is no dict)
+        for name in sorted(given - names):
+            raise ParameterError(f"{props.plugin_name()} has no parameter {name!r}; {nearest(name, names)}")
+        model = cls()
+        for parameter in declarations:
+            setattr(model, parameter.name, parameter.parse(props))
+            for name in parameter.names():
+                props.mark_queried(name)
+        model.configure(given)
+        return model
+
+    def configure(self, given: set[str]) -> None:
+        """Settle parameters that depend on each other."""
+
+    def children(self) -> dict[str, Any]:
+        """Textures and nested BSDFs by name, for ``mi.traverse``."""
+        return {
+            name: child
+            for parameter in self.declarations()
+            for name, child in parameter.children(getattr(self, parameter.name)).items()
+        }
+
+    def check(self) -> None:
+        """Check values that may have been updated through ``mi.traverse``."""
+        for parameter in self.declarations():
+            parameter.check(getattr(self, parameter.name))
+
+
+def _objects(parent: Any) -> dict[str, Any]:
+    """What a Mitsuba object shows to ``mi.traverse``, by name."""
+    found: dict[str, Any] = {}
+
+    class Collect(mi.TraversalCallback):
+        def put(self, name: str, value: Any, flags: int) -> None:
+            found[name] = value
+
+    parent.traverse(Collect())
+    return found
+
+
+def _numbers(texture: Any) -> Iterable[tuple[str, np.ndarray]]:
+    """The constants and texels of a texture; not those that are being differentiated: they are the optimiser's."""
+    for key, data in mi.traverse(texture).items() if isinstance(texture, mi.Texture) else ():
+        if key.rsplit(".", 1)[-1] not in ("value", "values", "data") or dr.grad_enabled(data):
+            continue
+        numbers = np.asarray(data)
+        # In spectral variants Mitsuba keeps colours as three coefficients, which have no range.
+        if not (mi.is_spectral and numbers.size > 1 and 3 in (numbers.shape[0], numbers.shape[-1])):
+            yield key, numbers

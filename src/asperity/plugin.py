@@ -1,0 +1,144 @@
+"""The one adapter between asperity's models and Mitsuba: the only place that knows how plugins are registered.
+
+Mitsuba has one ``mi.BSDF`` class per variant and forgets nothing: a registration is keyed by name and variant. So each
+model, a plain class, is wrapped once for every variant that becomes active.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from . import llvm
+from .models import MODELS, TEXTURES
+
+ALBEDO_SAMPLES = 128
+
+
+def register() -> None:
+    """Register every model now, if a variant is active, and after every later switch; may be called twice."""
+    mi.detail.remove_variant_callback(_switched)
+    mi.detail.add_variant_callback(_switched)
+    if mi.variant() is not None:
+        _switched(None, mi.variant())
+
+
+def _switched(_old: str | None, new: str | None) -> None:
+    llvm.guard(new)
+    for name, model in MODELS.items():
+        mi.register_bsdf(name, _bsdf(model, new))
+    for name, model in TEXTURES.items():
+        mi.register_texture(name, _texture(model, new))
+
+
+@cache
+def _bsdf(model_class: Any, variant: str) -> type:
+    """The ``mi.BSDF`` of the active ``variant`` that wraps ``model_class``."""
+
+    class Plugin(mi.BSDF):
+        """Mitsuba's view of a model: flags, components, polarisation, traversal; the physics is the model's."""
+
+        def __init__(self, props: mi.Properties) -> None:
+            mi.BSDF.__init__(self, props)
+            self.model = model_class.parse(props)
+            self.m_components = self.model.components()
+            self.m_flags = 0
+            for flags in self.m_components:
+                self.m_flags |= flags
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            value, pdf = self.model.eval_pdf(ctx, si, wo, active)
+            return _depolarise(value), pdf
+
+        # Dr.Jit traces lazily: what the caller does not use is never compiled.
+        def eval(self, ctx, si, wo, active=True):
+            return self.eval_pdf(ctx, si, wo, active)[0]
+
+        def pdf(self, ctx, si, wo, active=True):
+            return self.eval_pdf(ctx, si, wo, active)[1]
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            bs, weight = self.model.sample(ctx, si, sample1, sample2, active)
+            return bs, _depolarise(weight)
+
+        def eval_diffuse_reflectance(self, si, active=True):
+            return _albedo(self.model, si, active)
+
+        def traverse(self, callback: mi.TraversalCallback) -> None:
+            for name, child in self.model.children().items():
+                callback.put(name, child, mi.ParamFlags.Differentiable)
+
+        def parameters_changed(self, keys: list[str]) -> None:
+            self.model.check()
+            self.model.update()
+
+        def to_string(self) -> str:
+            children = (f"  {name} = {child}".replace("\n", "\n  ") for name, child in self.model.children().items())
+            return f"{model_class.__name__}[\n" + ",\n".join(children) + "\n]"
+
+    Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
+    return Plugin
+
+
+@cache
+def _texture(model_class: Any, variant: str) -> type:
+    """The ``mi.Texture`` of the active ``variant`` that wraps a texture of ours."""
+
+    class Plugin(mi.Texture):
+        """Mitsuba's view of a texture of one number."""
+
+        def __init__(self, props: mi.Properties) -> None:
+            mi.Texture.__init__(self, props)
+            self.model = model_class.parse(props)
+
+        def eval_1(self, si, active=True):
+            return self.model.eval(si, active)
+
+        def eval(self, si, active=True):
+            return mi.UnpolarizedSpectrum(self.model.eval(si, active))
+
+        def eval_3(self, si, active=True):
+            return mi.Color3f(self.model.eval(si, active))
+
+        def mean(self):
+            return self.model.mean()
+
+        def is_spatially_varying(self) -> bool:
+            return True
+
+        def traverse(self, callback: mi.TraversalCallback) -> None:
+            for name, child in self.model.children().items():
+                callback.put(name, child, mi.ParamFlags.Differentiable)
+
+        def to_string(self) -> str:
+            return f"{model_class.__name__}[]"
+
+    Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
+    return Plugin
+
+
+def _depolarise(value: Any) -> Any:
+    return mi.depolarizer(value) if mi.is_polarized else value
+
+
+def _albedo(model: Any, si: mi.SurfaceInteraction3f, active: Any) -> Any:
+    """Directional albedo at ``si.wi``: the mean weight of stratified samples, the same ones every time.
+
+    Mitsuba's default evaluates at normal exitance, which is right for Lambertian BSDFs only.
+    """
+    ctx, total = mi.BSDFContext(), mi.UnpolarizedSpectrum(0)
+    index = mi.UInt32(0)
+
+    def add(index, total):
+        # Strata for the choice of the lobe, the R2 sequence (Roberts 2018) for the direction.
+        jitter, *u = (x - dr.floor(x) for x in (mi.Float(index) * a + 0.5 for a in (0.6180339887, 0.7548776662, 0.569840291)))
+        _, weight = model.sample(ctx, si, (mi.Float(index) + jitter) / ALBEDO_SAMPLES, mi.Point2f(*u), active)
+        return index + 1, total + weight
+
+    _, total = dr.while_loop(
+        (index, total), lambda index, total: index < ALBEDO_SAMPLES, add, max_iterations=ALBEDO_SAMPLES
+    )
+    return total / ALBEDO_SAMPLES
