@@ -8,17 +8,15 @@ This module imports neither Dr.Jit nor Mitsuba at its top: it has to run before 
 from __future__ import annotations
 
 import ctypes
-import importlib.metadata
 import importlib.util
 import os
+import site
 import sys
+import sysconfig
 from pathlib import Path
 
 OLDEST_WORKING = 17
 """LLVM 15 and 16 abort; 19 and 23 were measured to work. X86 learned to lower ``fminimum`` in 17."""
-
-WHEEL = "karellen-llvm-core"
-"""The wheel on PyPI that carries a recent libLLVM (Linux x86-64 only)."""
 
 
 class LLVMError(ImportError):
@@ -27,12 +25,10 @@ class LLVMError(ImportError):
 
 def bundled() -> Path | None:
     """Path of the libLLVM that came with ``pip install asperity``, or None where there is no such wheel."""
-    try:
-        files = importlib.metadata.files(WHEEL) or []
-    except importlib.metadata.PackageNotFoundError:
-        return None
-    found = (Path(str(f.locate())).resolve() for f in files if f.name.startswith("libLLVM.so."))
-    return next((path for path in found if path.exists()), None)
+    # The wheel puts it into <prefix>/lib; asking importlib.metadata would read a list of 6000 headers first.
+    folders = {Path(sysconfig.get_path("data")), Path(site.USER_BASE or sys.prefix)}
+    found = (path for folder in folders for path in sorted((folder / "lib").glob("libLLVM.so.*")))
+    return next(found, None)
 
 
 def choose() -> None:

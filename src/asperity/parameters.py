@@ -7,7 +7,6 @@ A declaration is a class attribute of the model. From it come parsing, error mes
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -19,16 +18,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-
-class ParameterError(ValueError):
-    """A parameter is unknown, of the wrong type, out of its range, or at odds with another one."""
-
-
-def nearest(name: str, allowed: Iterable[str]) -> str:
-    """Say which of ``allowed`` the user may have meant, or list them all."""
-    allowed = sorted(allowed)
-    match = difflib.get_close_matches(name, allowed, n=1)
-    return f"did you mean {match[0]!r}?" if match else f"allowed: {', '.join(allowed)}."
+from .errors import ParameterError, suggestion
 
 
 class Row(NamedTuple):
@@ -236,7 +226,9 @@ class Conductor(Parameter):
         if not isinstance(material, str):
             raise ParameterError(f"{name} = {material!r}: expected the name of a metal, such as 'Au'.")
         if material not in materials():
-            raise ParameterError(f"{name} = {material!r}: not a material that Mitsuba knows; {nearest(material, materials())}")
+            raise ParameterError(
+                f"{name} = {material!r}: not a material that Mitsuba knows. {suggestion(material, materials())}"
+            )
         found = _objects(mi.load_dict({"type": "conductor", "material": material}))
         return Complex(found["eta"], found["k"])
 
@@ -255,10 +247,14 @@ class Conductor(Parameter):
         """A line for each name."""
         material, eta, k, reflectivity, edge_tint = self.names()
         default = "-" if self.default is None else self.default
-        yield Row(material, "name", default, 'Mitsuba\'s, or "none"', "", f"{self.meaning}: by name; 'none' is a mirror")
+        yield Row(
+            material, "name", default, 'Mitsuba\'s, or "none"', "", f"{self.meaning}: by name; 'none' is a mirror"
+        )
         yield Row(eta, "spectrum or texture", "-", "> 0", "", f"{self.meaning}: real part of the index, with {k}")
         yield Row(k, "spectrum or texture", "-", "[0, inf)", "", f"{self.meaning}: extinction, with {eta}")
-        yield Row(reflectivity, "colour or texture", "-", "[0, 1]", "", f"{self.meaning}: by colour at normal incidence")
+        yield Row(
+            reflectivity, "colour or texture", "-", "[0, 1]", "", f"{self.meaning}: by colour at normal incidence"
+        )
         yield Row(edge_tint, "colour or texture", "0", "[0, 1]", "", f"colour bias at grazing, with {reflectivity}")
 
 
@@ -296,8 +292,7 @@ class Choice(Parameter):
         """The word, if it is one of the options."""
         given = props.get(self.name, self.options[0])
         if given not in self.options:
-            hint = nearest(given, self.options) if isinstance(given, str) else f"allowed: {self.allowed()}."
-            raise ParameterError(f"{self.name} = {given!r}: {hint}")
+            raise ParameterError(f"{self.name} = {given!r}. {suggestion(str(given), self.options)}")
         return given
 
     def rows(self) -> Iterable[Row]:
@@ -365,7 +360,7 @@ class Declared:
         names = {name for parameter in declarations for name in parameter.names()}
         given = {name for name in props.keys() if not is_unnamed(name)}  # noqa: SIM118  (Properties is no dict)
         for name in sorted(given - names):
-            raise ParameterError(f"{props.plugin_name()} has no parameter {name!r}; {nearest(name, names)}")
+            raise ParameterError(f"{props.plugin_name()} has no parameter {name!r}. {suggestion(name, sorted(names))}")
         model = cls()
         for parameter in declarations:
             setattr(model, parameter.name, parameter.parse(props))

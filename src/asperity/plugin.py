@@ -134,7 +134,9 @@ def _albedo(model: Any, si: mi.SurfaceInteraction3f, active: Any) -> Any:
 
     def add(index, total):
         # Strata for the choice of the lobe, the R2 sequence (Roberts 2018) for the direction.
-        jitter, *u = (x - dr.floor(x) for x in (mi.Float(index) * a + 0.5 for a in (0.6180339887, 0.7548776662, 0.569840291)))
+        jitter, *u = (
+            x - dr.floor(x) for x in (mi.Float(index) * a + 0.5 for a in (0.6180339887, 0.7548776662, 0.569840291))
+        )
         _, weight = model.sample(ctx, si, (mi.Float(index) + jitter) / ALBEDO_SAMPLES, mi.Point2f(*u), active)
         return index + 1, total + weight
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.scenes import make_textures
-from asperity.scenes.errors import UnknownNameError, UnreadableFileError
+from asperity.errors import UnknownNameError, UnreadableFileError
 from asperity.scenes.objects import OBJECTS, from_file, knot, pawn, sphere, to_mitsuba
 from asperity.scenes.preview import ENVIRONMENTS, WHITE, irradiance, lit_by, preview
 

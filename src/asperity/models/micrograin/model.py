@@ -7,13 +7,25 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ...errors import ParameterError
 from ...microfacet.fresnel import conductor
-from ...parameters import BSDF, Choice, Colour, Conductor, Declared, Flag, Ior, ParameterError, Texture
+from ...parameters import BSDF, Choice, Colour, Conductor, Declared, Flag, Ior, Texture
 from . import smith
 from .diffuse import lambertian
 from .grains import density, exposure, normal_in_sphere_space, sample_visible_normal, visible_fraction
 from .shadows import lift, shadow, to_sphere, union
 
+CITATION = """\
+@article{Lucas2024Micrograin,
+  author  = {Lucas, Simon and Ribardi\\`ere, Micka\\"el and Pacanowski, Romain and Barla, Pascal},
+  title   = {A Fully-correlated Anisotropic Micrograin {BSDF} Model},
+  journal = {ACM Transactions on Graphics},
+  volume  = {43},
+  number  = {4},
+  pages   = {111},
+  year    = {2024},
+  doi     = {10.1145/3658224}
+}"""
 TINY = 1e-20
 ALL_COMPONENTS = 0xFFFFFFFF
 METAL = {"material", "eta", "k", "reflectivity", "edge_tint"}
@@ -52,8 +64,12 @@ class Micrograin(Declared):
     ``diffuse_reflectance`` or an index of refraction is given). For single scattering the model is exact for its geometry.
     """
 
+    citation = CITATION
+
     tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1)
-    beta = Texture("height of the grains over their radius: small is flat and shiny, large is rough", 1.0, open_low=True)
+    beta = Texture(
+        "height of the grains over their radius: small is flat and shiny, large is rough", 1.0, open_low=True
+    )
     beta_x = Texture("beta along x, instead of beta", None, open_low=True)
     beta_y = Texture("beta along y, instead of beta", None, open_low=True)
     metal = Conductor("metal of the grains", "none")
@@ -93,9 +109,13 @@ class Micrograin(Declared):
     def components(self) -> list[int]:
         """Flags of the lobes: specular grains, diffuse grains, then the base's."""
         front = mi.BSDFFlags.FrontSide | (0 if self.isotropic else mi.BSDFFlags.Anisotropic)
-        own = [mi.BSDFFlags.GlossyReflection | front] * self.specular + [mi.BSDFFlags.DiffuseReflection | front] * self.diffuse
+        own = [mi.BSDFFlags.GlossyReflection | front] * self.specular + [
+            mi.BSDFFlags.DiffuseReflection | front
+        ] * self.diffuse
         self.own = [int(flags) for flags in own]
-        return self.own + ([] if self.base is None else [self.base.flags(n) for n in range(self.base.component_count())])
+        return self.own + (
+            [] if self.base is None else [self.base.flags(n) for n in range(self.base.component_count())]
+        )
 
     def eval_pdf(self, ctx, si, wo, active):
         """(f |cos_o|, solid-angle density of `sample`): the sum of the lobes (Lucas 2024, Eq. 20)."""
@@ -200,7 +220,9 @@ class Micrograin(Declared):
         # Mitsuba hands out three numbers and this takes four: the coarse and the fine half of one of them serve as two.
         coarse = u * 2048
         fine = coarse - dr.floor(coarse)
-        return frame.to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(dr.floor(coarse) / 2048 + fine / 2048, fine)))
+        return frame.to_world(
+            mi.warp.square_to_cosine_hemisphere(mi.Point2f(dr.floor(coarse) / 2048 + fine / 2048, fine))
+        )
 
     def _specular(self, si, wi, wo, grains: Grains, active):
         """tau_0 D G F / (4 cos_i) (Lucas 2024, Eq. 22), and the density of reflection at visible normals times tau_i."""
@@ -212,7 +234,9 @@ class Micrograin(Declared):
             ndf = grains.r * exposure(grains.r, h, 0) / smith.filling_factor(grains.r)
             gaf = smith.masking(grains.r, i) * smith.masking(grains.r, o) * smith.grain_weight(grains.r, i, o)
             common = dr.pi * d_ggx / (4 * wi.z)
-            return fresnel * common * ndf * gaf, common / dr.pi * smith.visible_masking(i) * visible_fraction(grains.r, i)
+            return fresnel * common * ndf * gaf, common / dr.pi * smith.visible_masking(i) * visible_fraction(
+                grains.r, i
+            )
         shadow_i, shadow_o = shadow(i, h), shadow(o, h)
         common = dr.pi * grains.r * d_ggx / (4 * wi.z)
         value = common * exposure(grains.r, h, self._shaded(i, o, h, shadow_i, shadow_o))
@@ -226,7 +250,9 @@ class Micrograin(Declared):
             i, o = grains.to_sphere(wi), grains.to_sphere(wo)
             through = (1 - coat(wi.z)) * (1 - coat(wo.z)) if coat else 1
             cosine = wo.z / dr.pi
-            return albedo * smith.grain_weight(grains.r, i, o) * through * cosine, cosine * visible_fraction(grains.r, i)
+            return albedo * smith.grain_weight(grains.r, i, o) * through * cosine, cosine * visible_fraction(
+                grains.r, i
+            )
         first, second, pdf = lambertian(
             *grains,
             wi,

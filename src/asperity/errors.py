@@ -1,0 +1,46 @@
+"""What goes wrong when somebody asks for something: a name nobody knows, a value out of range, an unreadable file."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection
+from pathlib import Path
+
+
+class AsperityError(ValueError):
+    """The base of asperity's errors about what it was given; the command line prints them without a traceback."""
+
+
+class ParameterError(AsperityError):
+    """A parameter is unknown, of the wrong type, out of its range, or at odds with another one."""
+
+
+class UnknownNameError(AsperityError):
+    """A name outside the allowed ones."""
+
+    def __init__(self, what: str, given: str, allowed: Collection[str]):
+        super().__init__(f"unknown {what} {given!r}. {suggestion(given, allowed)}")
+
+
+class UnreadableFileError(AsperityError):
+    """A file that is missing, of another format, or damaged."""
+
+    def __init__(self, what: str, path: Path, formats: Collection[str], reason: str):
+        super().__init__(f"cannot read the {what} {str(path)!r}: {reason}. Formats: {', '.join(formats)}.")
+
+
+def suggestion(given: str, allowed: Collection[str]) -> str:
+    """The nearest of the allowed names, where one is near, and all of them."""
+    nearest = difflib.get_close_matches(given, allowed, n=1, cutoff=0.5)
+    hint = f"Did you mean {nearest[0]!r}? " if nearest else ""
+    return f"{hint}Allowed: {', '.join(allowed)}."
+
+
+def readable(what: str, path: str | Path, formats: Collection[str]) -> Path:
+    """The path of an existing file whose ending is one of ``formats``."""
+    path = Path(path)
+    if path.suffix.lower() not in formats:
+        raise UnreadableFileError(what, path, formats, f"its ending is {path.suffix!r}")
+    if not path.is_file():
+        raise UnreadableFileError(what, path, formats, "there is no such file")
+    return path

@@ -1,0 +1,151 @@
+"""Calls any ``mi.BSDF`` on arrays of directions, without a scene.
+
+Directions are local: z is the surface normal, and all of them point away from the surface. In polarised variants the
+values are those for unpolarised light.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+SHORTEST, LONGEST = 400.0, 700.0
+"""nm. Spectral variants evaluate at wavelengths between these."""
+
+
+def active_variant() -> str:
+    """Return the variant in use; complain if none is."""
+    if mi.variant() is None:
+        raise RuntimeError('no Mitsuba variant is set: call mitsuba.set_variant("llvm_ad_rgb"), say, first')
+    return str(mi.variant())
+
+
+def load(description: dict[str, Any] | mi.BSDF) -> mi.BSDF:
+    """Return the BSDF that a dictionary describes, or the BSDF itself if it is one already."""
+    variant = active_variant()
+    bsdf = mi.load_dict(description) if isinstance(description, dict) else description
+    if not isinstance(bsdf, mi.BSDF):
+        raise TypeError(f"expected a BSDF of variant {variant} or the dictionary of one, got {bsdf!r:.200}")
+    return bsdf
+
+
+def interaction(wi: mi.Vector3f, lanes: int = 1) -> mi.SurfaceInteraction3f:
+    """Return a point seen from ``wi``, in a frame equal to the world's, at the middle of the texture.
+
+    In spectral variants every lane gets wavelengths of its own, always the same ones for the same lane: channel k is
+    uniform in the k-th part of the visible range, so that two calls can be compared.
+    """
+    lanes = max(lanes, dr.width(wi.x))
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+    si.wi = wi
+    si.t = 1
+    si.uv = [0.5, 0.5]
+    si.n = [0, 0, 1]
+    si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1))
+    si.dp_du = [1, 0, 0]
+    si.dp_dv = [0, 1, 0]
+    if mi.is_spectral:
+        lane = dr.arange(mi.UInt32, lanes) if dr.is_jit_v(mi.Float) else 0
+        channels = len(si.wavelengths)
+        width = (LONGEST - SHORTEST) / channels
+        si.wavelengths = [SHORTEST + width * (k + mi.sample_tea_float32(lane, k)) for k in range(channels)]
+    return si
+
+
+def _lanes(*directions: mi.Vector3f) -> int:
+    return max(dr.width(w.x) for w in directions)
+
+
+def eval(bsdf: mi.BSDF, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.UnpolarizedSpectrum:
+    """Return f(wi, wo) |cos θo|, in 1/sr."""
+    return mi.unpolarized_spectrum(bsdf.eval(mi.BSDFContext(), interaction(wi, _lanes(wi, wo)), wo))
+
+
+def pdf(bsdf: mi.BSDF, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
+    """Return the density with which ``bsdf`` samples ``wo``, in 1/sr."""
+    return bsdf.pdf(mi.BSDFContext(), interaction(wi, _lanes(wi, wo)), wo)
+
+
+def eval_pdf(bsdf: mi.BSDF, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
+    """Return what ``eval`` and ``pdf`` return, from one call."""
+    value, density = bsdf.eval_pdf(mi.BSDFContext(), interaction(wi, _lanes(wi, wo)), wo)
+    return mi.unpolarized_spectrum(value), density
+
+
+def sample(
+    bsdf: mi.BSDF, wi: mi.Vector3f, sample1: mi.Float, sample2: mi.Point2f
+) -> tuple[mi.BSDFSample3f, mi.UnpolarizedSpectrum]:
+    """Return a sampled direction and its weight f |cos θo| / pdf."""
+    lanes = max(dr.width(sample1), _lanes(wi))
+    drawn, weight = bsdf.sample(mi.BSDFContext(), interaction(wi, lanes), sample1, sample2)
+    return drawn, mi.unpolarized_spectrum(weight)
+
+
+def variates(n: int, seed: int) -> tuple[mi.Float, mi.Point2f]:
+    """Return the ``n`` random numbers and points of the unit square that ``sample`` takes."""
+    # Streams numbered 0, 1, 2, ... are correlated: scramble the numbers first.
+    state, stream = mi.sample_tea_32(dr.arange(mi.UInt32, n), seed)
+    rng = mi.PCG32(initstate=state, initseq=stream)
+    return mi.Float(rng.next_float32()), mi.Point2f(rng.next_float32(), rng.next_float32())
+
+
+def direction(theta: float, phi: float) -> mi.Vector3f:
+    """Return the direction at ``theta`` from the normal and azimuth ``phi``, in degrees.
+
+    It is opaque to Dr.Jit: all directions share one compiled kernel.
+    """
+    t, p = np.radians([theta, phi])
+    xyz = (np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t))
+    return mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in xyz))
+
+
+def uniform_sphere(n: int, seed: int) -> mi.Vector3f:
+    """Return ``n`` directions, uniform over the sphere."""
+    return mi.warp.square_to_uniform_sphere(variates(n, seed)[1])
+
+
+def uniform_hemisphere(n: int, seed: int) -> mi.Vector3f:
+    """Return ``n`` directions, uniform over the upper hemisphere."""
+    return mi.warp.square_to_uniform_hemisphere(variates(n, seed)[1])
+
+
+def cosine_hemisphere(n: int, seed: int) -> mi.Vector3f:
+    """Return ``n`` directions over the upper hemisphere, with density cos θ / π."""
+    return mi.warp.square_to_cosine_hemisphere(variates(n, seed)[1])
+
+
+def hard_directions() -> np.ndarray:
+    """Return directions (n, 3) that formulas divide by zero at: grazing, horizontal, normal; on both sides."""
+    cosines = np.array([1, 0.7, 0.3, *10.0 ** -np.arange(1, 7), 0])
+    z, phi = (a.ravel() for a in np.meshgrid(np.concatenate([cosines, -cosines]), [0, 1.1, 2.5]))
+    r = np.sqrt(1 - z**2)
+    return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=1)
+
+
+def hard_pairs(seed: int = 0) -> tuple[mi.Vector3f, mi.Vector3f]:
+    """Return pairs wi, wo of hard directions; also wo = wi, mirrored, opposite and normal, exactly and nearly so."""
+    rng = np.random.default_rng(seed)
+    hard = hard_directions()
+    normal = np.broadcast_to([0.0, 0.0, 1.0], hard.shape)
+    wi, wo = [np.repeat(hard, len(hard), axis=0)], [np.tile(hard, (len(hard), 1))]
+    for special in (hard, hard * [-1, -1, 1], -hard, normal, -normal):
+        for shift in (0, *10.0 ** -np.arange(2, 8), *10.0 ** -np.arange(2, 8)):
+            moved = special + shift * rng.normal(size=special.shape)
+            wi.append(hard)
+            wo.append(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+    return vectors(np.concatenate(wi)), vectors(np.concatenate(wo))
+
+
+def vectors(directions: np.ndarray) -> mi.Vector3f:
+    """Return an array (n, 3) as ``n`` Mitsuba vectors."""
+    return mi.Vector3f(np.ascontiguousarray(directions.T, dtype=np.float32))
+
+
+def to_numpy(value: Any, lanes: int) -> np.ndarray:
+    """Return a Dr.Jit array as float64 (components, lanes): values that are the same in all lanes come as one lane."""
+    rows = np.array(dr.detach(value), dtype=np.float64)
+    rows = np.atleast_2d(rows) if dr.is_jit_v(mi.Float) else rows.reshape(-1, 1)
+    return np.broadcast_to(rows, (len(rows), lanes))
