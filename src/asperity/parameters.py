@@ -8,7 +8,7 @@ A declaration is a class attribute of the model. From it come parsing, error mes
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -140,7 +140,7 @@ class Colour(Texture):
 class Ior(Texture):
     """A dielectric's index of refraction: a name that Mitsuba knows (``"bk7"``), a number or a texture."""
 
-    low: float = 1.0
+    low: float = 0.5
     high: float = 5.0
     kind: ClassVar[str] = "name, number or texture"
 
@@ -340,8 +340,10 @@ class Declared:
     """What reads the declarations of a class; the base of every model.
 
     A model may define ``configure(given)`` to settle parameters that depend on each other; ``given`` holds the names
-    that the scene gave.
+    that the scene gave. ``constant`` names those that cannot be differentiated.
     """
+
+    constant: Set[str] = frozenset()
 
     @classmethod
     def declarations(cls) -> list[Parameter]:
@@ -367,10 +369,14 @@ class Declared:
             for name in parameter.names():
                 props.mark_queried(name)
         model.configure(given)
+        model.update()
         return model
 
     def configure(self, given: set[str]) -> None:
         """Settle parameters that depend on each other."""
+
+    def update(self) -> None:
+        """Bring up to date what is made from the parameters, at first and whenever ``mi.traverse`` changed one."""
 
     def children(self) -> dict[str, Any]:
         """Textures and nested BSDFs by name, for ``mi.traverse``."""

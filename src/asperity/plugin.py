@@ -9,13 +9,13 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 
 from . import llvm
+from .microfacet.albedo import directional_albedo
 from .models import MODELS, TEXTURES
 
-ALBEDO_SAMPLES = 128
+ALBEDO_SAMPLES = 256
 
 
 def register() -> None:
@@ -65,11 +65,13 @@ def _bsdf(model_class: Any, variant: str) -> type:
             return bs, _depolarise(weight)
 
         def eval_diffuse_reflectance(self, si, active=True):
-            return _albedo(self.model, si, active)
+            # Mitsuba's default, pi times the value at normal incidence, is right for Lambertian BSDFs only.
+            return _depolarise(directional_albedo(self.model.sample, si, active, ALBEDO_SAMPLES))
 
         def traverse(self, callback: mi.TraversalCallback) -> None:
             for name, child in self.model.children().items():
-                callback.put(name, child, mi.ParamFlags.Differentiable)
+                constant = name in self.model.constant
+                callback.put(name, child, mi.ParamFlags.NonDifferentiable if constant else mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys: list[str]) -> None:
             self.model.check()
@@ -122,25 +124,3 @@ def _texture(model_class: Any, variant: str) -> type:
 
 def _depolarise(value: Any) -> Any:
     return mi.depolarizer(value) if mi.is_polarized else value
-
-
-def _albedo(model: Any, si: mi.SurfaceInteraction3f, active: Any) -> Any:
-    """Directional albedo at ``si.wi``: the mean weight of stratified samples, the same ones every time.
-
-    Mitsuba's default evaluates at normal exitance, which is right for Lambertian BSDFs only.
-    """
-    ctx, total = mi.BSDFContext(), mi.UnpolarizedSpectrum(0)
-    index = mi.UInt32(0)
-
-    def add(index, total):
-        # Strata for the choice of the lobe, the R2 sequence (Roberts 2018) for the direction.
-        jitter, *u = (
-            x - dr.floor(x) for x in (mi.Float(index) * a + 0.5 for a in (0.6180339887, 0.7548776662, 0.569840291))
-        )
-        _, weight = model.sample(ctx, si, (mi.Float(index) + jitter) / ALBEDO_SAMPLES, mi.Point2f(*u), active)
-        return index + 1, total + weight
-
-    _, total = dr.while_loop(
-        (index, total), lambda index, total: index < ALBEDO_SAMPLES, add, max_iterations=ALBEDO_SAMPLES
-    )
-    return total / ALBEDO_SAMPLES

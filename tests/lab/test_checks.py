@@ -95,7 +95,7 @@ def test_catches_a_model_that_fails_in_scalar_variants_and_restores_the_variant(
 
 def test_delta_lobes_are_skipped_with_a_reason():
     skipped = [r for r in checks.check({"type": "conductor"}) if r.passed is None]
-    assert {r.name for r in skipped} == {"chi²", "weight", "sampled pdf", "reciprocity"}
+    assert {r.name for r in skipped} == {"chi²", "weight", "sampled pdf", "reciprocity", "gradients"}
     assert all("delta" in r.measured for r in skipped)
 
 

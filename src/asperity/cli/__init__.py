@@ -1,1 +1,50 @@
-"""."""
+"""The ``asperity`` command: one file a command. Mitsuba is imported by the commands that need it, when they run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+
+from asperity import __version__
+
+from .check import check
+from .cite import cite
+from .doctor import doctor
+from .errors import OneLineErrors
+from .list import list_all
+from .render import render
+from .show import show
+
+COMMANDS: dict[str, Callable[..., None]] = {
+    "render": render,
+    "list": list_all,
+    "show": show,
+    "cite": cite,
+    "check": check,
+    "doctor": doctor,
+}
+"""In the order of the help."""
+
+app = typer.Typer(cls=OneLineErrors, no_args_is_help=True, pretty_exceptions_enable=False)
+for name, command in COMMANDS.items():
+    app.command(name)(command)
+
+
+def version(wanted: bool) -> None:
+    """Print the version and leave."""
+    if wanted:
+        typer.echo(f"asperity {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    version: Annotated[bool, typer.Option("--version", callback=version, is_eager=True, help="Print it.")] = False,
+) -> None:
+    """Materials from explicit microgeometry: render, inspect and check them.
+
+    `asperity render` makes a first picture; `asperity doctor` says what is wrong if it does not.
+    """

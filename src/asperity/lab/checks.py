@@ -609,6 +609,8 @@ def gradients(bsdf: mi.BSDF) -> Result:
     if not keys or not dr.is_diff_v(mi.Float):
         return Result("gradients", None, "has no differentiable parameter")
     wi, wo, weight = weighted_pairs(bsdf, 10_000)
+    if not evaluate.to_numpy(evaluate.eval(bsdf, wi, wo), weight.size).any():
+        return Result("gradients", None, "has only delta lobes: eval is 0")
     errors, finite = {}, True
     for key in keys:
         with restored(params, [key]):
@@ -684,7 +686,7 @@ def variants(description: dict[str, Any] | mi.BSDF) -> Result:
             if not finite:
                 troubles.append(f"{variant}: not finite")
         except Exception as error:  # whatever a plugin raises is its trouble, and is reported
-            troubles.append(f"{variant}: {type(error).__name__}: {error}")
+            troubles.append(f"{variant}: {complaint(error)}")
         finally:
             mi.set_variant(before)
     rgb = [v for v in values if "rgb" in v]
@@ -696,6 +698,11 @@ def variants(description: dict[str, Any] | mi.BSDF) -> Result:
         measured + (f" ({len(absent)} need a GPU: skipped)" if absent else ""),
         f"loads, finite; {' = '.join(rgb)} to 1e-4 of the largest value: same formulas, other rounding",
     )
+
+
+def complaint(error: Exception) -> str:
+    """Return the kind of an exception and its first line: Dr.Jit's go on with every overload of a function."""
+    return f"{type(error).__name__}: {str(error).partition(chr(10))[0]}"
 
 
 def scale(values: np.ndarray) -> float:
@@ -769,4 +776,4 @@ def attempt(name: str, bsdf: mi.BSDF, description: dict[str, Any] | mi.BSDF) -> 
     try:
         return variants(description) if name == "variants" else CHECKS[name](bsdf)
     except Exception as error:  # whatever a plugin raises is its failure, and is reported
-        return Result(name, False, f"{type(error).__name__}: {error}", "raises no exception")
+        return Result(name, False, complaint(error), "raises no exception")

@@ -78,11 +78,11 @@ def weave() -> dict[str, Image]:
     solid = np.where(thread, height, -0.6)
     hollow = gaussian_filter(solid, 9, mode="wrap") - solid
     shade = 0.82 - 0.22 * smoothstep(0, 0.5, hollow) - 0.05 * smoothstep(0.7, 1, np.abs(across))
-    gathered = hollow + 0.04 * noise(13, 1.3, 6) + 0.05 * noise(14, 1.8, 2)
+    gathered = hollow + 0.05 * noise(13, 1.3, 6) + 0.08 * noise(14, 1.8, 2)
     return {
         "weave": gaussian_filter(thread.astype(float), 0.6, mode="wrap"),
         "weave_shade": gaussian_filter(shade, 0.6, mode="wrap"),
-        "weave_dirt": 0.8 * gaussian_filter(smoothstep(-0.02, 0.26, gathered) * thread, 1.5, mode="wrap"),
+        "weave_dirt": 0.8 * gaussian_filter(smoothstep(-0.1, 0.3, gathered) * thread, 1.5, mode="wrap"),
     }
 
 

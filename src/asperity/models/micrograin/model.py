@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from ...errors import ParameterError
+from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import conductor
+from ...microfacet.quadrature import gauss_legendre
 from ...parameters import BSDF, Choice, Colour, Conductor, Declared, Flag, Ior, Texture
 from . import smith
+from .compensation import LossTable, lobe
 from .diffuse import lambertian
 from .grains import density, exposure, normal_in_sphere_space, sample_visible_normal, visible_fraction
 from .shadows import lift, shadow, to_sphere, union
@@ -27,6 +32,7 @@ CITATION = """\
   doi     = {10.1145/3658224}
 }"""
 TINY = 1e-20
+ONE_BELOW = 1 - 2**-24
 ALL_COMPONENTS = 0xFFFFFFFF
 METAL = {"material", "eta", "k", "reflectivity", "edge_tint"}
 COAT = {"int_ior", "ext_ior"}
@@ -36,6 +42,7 @@ ALBEDO = {"diffuse_reflectance", "diffuse_reflectance_2"}
 class Grains(NamedTuple):
     """The grains at a surface point."""
 
+    tau_0: Any
     r: Any  # density in sphere space
     beta_x: Any
     beta_y: Any
@@ -45,16 +52,21 @@ class Grains(NamedTuple):
         return to_sphere(w, self.beta_x, self.beta_y)
 
     def lift(self, w):
-        """A direction kept off the horizon; directions from below are meaningless then, and masked by the caller."""
+        """A direction kept off the horizon; those from below are meaningless then, and masked by the caller."""
         return lift(w, self.beta_x, self.beta_y)
 
+    def visible(self, w):
+        """Visible fraction tau_i along ``w``, kept off zero for those who divide by it."""
+        return dr.maximum(visible_fraction(self.r, self.to_sphere(w)), TINY)
 
-class Chances(NamedTuple):
-    """Probabilities with which `Micrograin.sample` chooses a lobe: they add up to one, or are all zero."""
 
-    specular: Any
-    diffuse: Any
-    base: Any
+class Lobe(NamedTuple):
+    """One of the grains' own lobes; the arguments of its functions begin with (si, active, grains, wi)."""
+
+    flags: int
+    weigh: Callable  # () -> share of the incident light, by which `sample` chooses
+    evaluate: Callable  # (wo) -> (f cos_o, density of draw)
+    draw: Callable  # (one number, a pair of numbers) -> wo
 
 
 class Micrograin(Declared):
@@ -65,6 +77,7 @@ class Micrograin(Declared):
     """
 
     citation = CITATION
+    table_key: tuple | None = None
 
     tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1)
     beta = Texture(
@@ -85,10 +98,11 @@ class Micrograin(Declared):
         "shadows: by height and direction (Eq. 18), by height only (Eq. 17), or Smith's (2023)",
         options=("correlated", "height", "smith"),
     )
+    scattering = Choice("multiple returns what single scattering loses; beta is constant then", options=("single", "multiple"))
     base = BSDF("what the grains lie on; black if none")
 
     def configure(self, given: set[str]) -> None:
-        """Settle what the grains are made of, and their axes."""
+        """Settle what the grains are made of, and their axes; forget what is not used."""
         metal, metal_2 = METAL & given, {name + "_2" for name in METAL} & given
         conflict({"beta"} & given, {"beta_x", "beta_y"} & given)
         conflict(metal | metal_2, (COAT | ALBEDO) & given, "grains are metal, or diffuse, perhaps under a coat")
@@ -97,164 +111,184 @@ class Micrograin(Declared):
         self.isotropic = not {"beta_x", "beta_y"} & given
         self.coated = self.specular and bool((COAT | ALBEDO) & given)
         self.diffuse = self.coated or not self.specular
-
         self.betas = (self.beta, self.beta) if self.isotropic else (self.beta_x or self.beta, self.beta_y or self.beta)
+
         second = self.diffuse_reflectance_2 if self.diffuse else self.metal_2
         if self.variation != "none" and second is None:
             needed = "diffuse_reflectance_2" if self.diffuse else "material_2, or eta_2 and k_2, or reflectivity_2"
             raise ParameterError(f"variation = {self.variation!r}: needs a second colour, {needed}.")
-        if self.variation == "none" and (unused := sorted((metal_2 | ALBEDO - {"diffuse_reflectance"}) & given)):
+        if self.variation == "none" and (unused := sorted((metal_2 | {"diffuse_reflectance_2", "variation_azimuth"}) & given)):
             raise ParameterError(f'{unused[0]}: needs variation = "height" or "normal".')
+        if self.masking == "smith" and (self.scattering != "single" or self.variation != "none"):
+            raise ParameterError('masking = "smith": its grains scatter once and have no height; leave out the rest.')
+
+        unused = [] if self.diffuse else ["diffuse_reflectance", "diffuse_reflectance_2"]
+        unused += ["metal", "metal_2"] if self.diffuse else []
+        unused += [] if self.coated else ["int_ior", "ext_ior"]
+        unused += [] if self.variation == "normal" else ["variation_azimuth"]
+        unused += [name for name in ("beta", "beta_x", "beta_y") if getattr(self, name) not in self.betas]
+        for name in unused:
+            setattr(self, name, None)
+        if self.scattering == "multiple":
+            self.constant = {"beta", "beta_x", "beta_y"}  # they make the table
 
     def components(self) -> list[int]:
-        """Flags of the lobes: specular grains, diffuse grains, then the base's."""
+        """Flags of the grains' lobes and then of the base's."""
         front = mi.BSDFFlags.FrontSide | (0 if self.isotropic else mi.BSDFFlags.Anisotropic)
-        own = [mi.BSDFFlags.GlossyReflection | front] * self.specular + [
-            mi.BSDFFlags.DiffuseReflection | front
-        ] * self.diffuse
-        self.own = [int(flags) for flags in own]
-        return self.own + (
-            [] if self.base is None else [self.base.flags(n) for n in range(self.base.component_count())]
-        )
+        glossy, diffuse = (int(flag | front) for flag in (mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.DiffuseReflection))
+        self.lobes = []
+        if self.specular:
+            self.lobes += [Lobe(glossy, self._weigh_specular, self._specular, self._draw_specular)]
+        if self.diffuse:
+            self.lobes += [Lobe(diffuse, self._weigh_diffuse, self._diffuse, self._draw_diffuse)]
+        if self.scattering == "multiple":
+            self.lobes += [Lobe(diffuse, self._weigh_multiple, self._multiple, self._draw_multiple)]
+        base = [] if self.base is None else [self.base.flags(n) for n in range(self.base.component_count())]
+        return [lobe.flags for lobe in self.lobes] + base
+
+    def update(self) -> None:
+        """Bring up to date what is made from the parameters."""
+        if self.scattering == "multiple":
+            key = (*(self._constant(beta) for beta in self.betas), self.diffuse)
+            if key != self.table_key:
+                self.table, self.table_key = LossTable(*key), key
 
     def eval_pdf(self, ctx, si, wo, active):
         """(f |cos_o|, solid-angle density of `sample`): the sum of the lobes (Lucas 2024, Eq. 20)."""
-        grains = self._grains(si, active)
-        chances, visible = self._chances(ctx, si, grains, active)
+        grains, chances, base_chance = self._choose(ctx, si, active)
         above = active & (si.wi.z > 0) & (wo.z > 0)
         wi, lifted = grains.lift(si.wi), grains.lift(wo)
         value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
-        for enabled, lobe, chance in (
-            (self._has_specular(ctx), self._specular, chances.specular),
-            (self._has_diffuse(ctx), self._diffuse, chances.diffuse),
-        ):
-            if enabled:
-                lobe_value, lobe_pdf = lobe(si, wi, lifted, grains, active)
-                value, pdf = value + lobe_value, pdf + chance / visible * lobe_pdf
+        for n, chance in chances.items():
+            lobe_value, lobe_pdf = self.lobes[n].evaluate(si, active, grains, wi, lifted)
+            value, pdf = value + lobe_value, pdf + chance * lobe_pdf
         value, pdf = dr.select(above, value * (wo.z / lifted.z), 0), dr.select(above, pdf, 0)
-        if (base_ctx := self._base_context(ctx)) is not None:
-            base_value, base_pdf = self.base.eval_pdf(base_ctx, si, wo, active)
+        if base_chance is not None:
+            base_value, base_pdf = self.base.eval_pdf(self._base_context(ctx), si, wo, active)
             value = value + self._pores(si.wi, wo, grains) * mi.unpolarized_spectrum(base_value)
-            pdf = pdf + chances.base * base_pdf
+            pdf = pdf + base_chance * base_pdf
         return dr.select(active, value, 0), dr.select(active, pdf, 0)
 
     def sample(self, ctx, si, sample1, sample2, active):
-        """Choose a lobe by how much of it is seen, sample it, and weight all lobes by the density of all."""
-        grains = self._grains(si, active)
-        chances, _ = self._chances(ctx, si, grains, active)
-        on_base = active & (sample1 >= chances.specular + chances.diffuse)
-        on_diffuse = ~on_base & (sample1 >= chances.specular)
+        """Choose a lobe by how much of it is seen, draw from it, and weight all lobes by the density of all."""
+        grains, chances, base_chance = self._choose(ctx, si, active)
+        wi, bs, start = grains.lift(si.wi), dr.zeros(mi.BSDFSample3f), mi.Float(0)
+        bs.eta = 1
+        for n, chance in chances.items():
+            chosen = sample1 >= start
+            wo = self.lobes[n].draw(si, active, grains, wi, _rescale(sample1, start, chance), sample2)
+            bs.wo = dr.select(chosen, wo, bs.wo)
+            bs.sampled_component = dr.select(chosen, mi.UInt32(n), bs.sampled_component)
+            bs.sampled_type = dr.select(chosen, mi.UInt32(self.lobes[n].flags), bs.sampled_type)
+            start = start + chance
+        if base_chance is None:
+            value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
+            return bs, value / dr.maximum(bs.pdf, TINY) & (bs.pdf > 0)
 
-        wi = grains.lift(si.wi)
-        m = self._visible_normal(wi, grains, sample2)
-        bs = dr.zeros(mi.BSDFSample3f)
-        bs.wo, bs.eta = mi.reflect(wi, m), 1
-        if self._has_diffuse(ctx):
-            rest = (sample1 - chances.specular) / dr.maximum(chances.diffuse, TINY)
-            bs.wo = dr.select(on_diffuse, self._cosine_lobe(m, rest), bs.wo)
-        bs.sampled_component = dr.select(on_diffuse, mi.UInt32(len(self.own) - 1), mi.UInt32(0))
-        bs.sampled_type = dr.select(on_diffuse, mi.UInt32(self.own[-1]), mi.UInt32(self.own[0]))
+        on_base = active & (sample1 >= start)
+        u = _rescale(sample1, start, base_chance)
+        base, base_weight = self.base.sample(self._base_context(ctx), si, u, sample2, on_base)
+        base.sampled_component += len(self.lobes)
+        bs = dr.select(on_base, base, bs)
+        # The grains' lobes end at the horizon, where a transmitting base may well have a density.
+        value, pdf = self.eval_pdf(ctx, si, bs.wo, active & (on_base | (bs.wo.z > 0)))
+        # Mitsuba's samplers reject by a weight of zero and leave the rest as it was; a black base is not a rejection.
+        value_there = mi.unpolarized_spectrum(self.base.eval(self._base_context(ctx), si, bs.wo, on_base))
+        rejected = on_base & dr.all(mi.unpolarized_spectrum(base_weight) == 0) & dr.any(value_there > 0)
+        pdf = dr.select(rejected, 0, pdf)
+        weight = value / dr.maximum(pdf, TINY) & (pdf > 0)
+        # A mirror, clear glass, or a hole in the base: nobody else reaches its direction, and eval_pdf does not know it.
+        delta = on_base & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        single = mi.unpolarized_spectrum(base_weight) * self._pores(si.wi, bs.wo, grains) / dr.maximum(base_chance, TINY)
+        bs.pdf = dr.select(delta, bs.pdf * base_chance, pdf)
+        return bs, dr.select(delta, single, weight) & active
 
-        base_ctx = self._base_context(ctx)
-        if base_ctx is not None:
-            rest = (sample1 - chances.specular - chances.diffuse) / dr.maximum(chances.base, TINY)
-            base, base_weight = self.base.sample(base_ctx, si, dr.clip(rest, 0, 1), sample2, on_base)
-            base.sampled_component += len(self.own)
-            bs = dr.select(on_base, base, bs)
-        base_pdf = bs.pdf
-        value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active & (on_base | (bs.wo.z > 0)))
-        weight = value / dr.maximum(bs.pdf, TINY) & (bs.pdf > 0)
-        if base_ctx is not None and mi.has_flag(self.base.flags(), mi.BSDFFlags.Delta):
-            # A mirror, clear glass or a hole in the base: eval_pdf knows nothing of these directions.
-            delta = on_base & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            pores = self._pores(si.wi, bs.wo, grains) / dr.maximum(chances.base, TINY)
-            weight = dr.select(delta, mi.unpolarized_spectrum(base_weight) * pores, weight)
-            bs.pdf = dr.select(delta, base_pdf * chances.base, bs.pdf)
-        return bs, dr.select(active & (bs.pdf > 0), weight, 0)
-
-    def _grains(self, si, active) -> Grains:
-        beta_x, beta_y = (texture.eval_1(si, active) for texture in self.betas)
-        return Grains(density(self.tau_0.eval_1(si, active)), beta_x, beta_y)
-
-    def _has_specular(self, ctx) -> bool:
-        return self.specular and ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
-
-    def _has_diffuse(self, ctx) -> bool:
-        return self.diffuse and ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, len(self.own) - 1)
+    def _choose(self, ctx, si, active) -> tuple[Grains, dict[int, Any], Any]:
+        """The grains here, the chance of each enabled lobe of theirs, and that of the base (None if not wanted)."""
+        tau_0 = self.tau_0.eval_1(si, active)
+        grains = Grains(tau_0, density(tau_0), *(beta.eval_1(si, active) for beta in self.betas))
+        wi, above = grains.lift(si.wi), si.wi.z > 0
+        shares = {
+            n: dr.select(above, lobe.weigh(si, active, grains, wi), 0)
+            for n, lobe in enumerate(self.lobes)
+            if ctx.is_enabled(mi.BSDFFlags(lobe.flags & int(mi.BSDFFlags.Smooth)), n)
+        }
+        # Exact visibility: Lucas 2024, Eq. 26 gives the pores too much.
+        base = None if self._base_context(ctx) is None else dr.select(above, 1 - grains.visible(wi), 1)
+        scale = dr.rcp(dr.maximum(sum(shares.values()) + (0 if base is None else base), TINY))
+        return grains, {n: share * scale for n, share in shares.items()}, None if base is None else base * scale
 
     def _base_context(self, ctx):
-        """The context in the base's own counting of components, or None if the base is not wanted."""
+        """The context as the base counts components, or None if the base is not there or not wanted."""
         if self.base is None or ctx.component == ALL_COMPONENTS:
             return ctx if self.base is not None else None
-        mine = ctx.component < len(self.own)
-        return None if mine else mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - len(self.own))
+        component = ctx.component - len(self.lobes)
+        return mi.BSDFContext(ctx.mode, ctx.type_mask, component) if component >= 0 else None
 
-    def _chances(self, ctx, si, grains: Grains, active) -> tuple[Chances, Any]:
-        """How `sample` chooses, and the visible fraction tau_i of the grains.
+    def _pores(self, wi, wo, grains: Grains):
+        """Share of the base that both directions reach, V_p (Lucas 2024, Eq. 23).
 
-        Exact visibility of grains and pores; Lucas 2024, Eq. 26 overestimates the pores'. Within the grains, Eq. 27.
+        Below the surface nothing casts shadows, but light meets the base through pores only, from either side.
         """
-        above = si.wi.z > 0
-        visible = visible_fraction(grains.r, grains.to_sphere(grains.lift(si.wi)))
-        part = mi.Float(0 if self.specular else 1)
-        if self.coated:
-            albedo = dr.mean(self.diffuse_reflectance.eval(si, active))
-            part = albedo / (albedo + self._coat(si, active)(dr.abs(si.wi.z)))
-        specular = dr.select(above, visible * (1 - part), 0) if self._has_specular(ctx) else mi.Float(0)
-        diffuse = dr.select(above, visible * part, 0) if self._has_diffuse(ctx) else mi.Float(0)
-        base = dr.select(above, 1 - visible, 1) if self._base_context(ctx) is not None else mi.Float(0)
-        scale = dr.rcp(dr.maximum(specular + diffuse + base, TINY))
-        return Chances(specular * scale, diffuse * scale, base * scale), dr.maximum(visible, TINY)
-
-    def _visible_normal(self, wi, grains: Grains, sample2):
-        i = grains.to_sphere(wi)
+        i, o = (grains.to_sphere(grains.lift(w)) for w in (wi, wo))
+        shadow_i, shadow_o = shadow(i, 0), shadow(o, 0)
         if self.masking == "smith":
-            m = smith.sample_visible_normal(i, sample2.x, sample2.y)
+            both = smith.pore_weight(grains.r, i, o)
         else:
-            m = sample_visible_normal(grains.r, i, sample2.x, sample2.y)
-        return dr.normalize(mi.Normal3f(grains.beta_x * m.x, grains.beta_y * m.y, m.z))
+            both = exposure(grains.r, 0, self._shaded(i, o, 0, shadow_i, shadow_o))
+        one = exposure(grains.r, 0, dr.select(wi.z > 0, shadow_i.area, 0) + dr.select(wo.z > 0, shadow_o.area, 0))
+        return dr.select((wi.z > 0) & (wo.z > 0), both, one)
 
-    def _cosine_lobe(self, m, u):
-        """A cosine-distributed direction about the visible normal; Smith's (2023) diffuse grains are flat instead."""
-        frame = mi.Frame3f(mi.Normal3f(0, 0, 1) if self.masking == "smith" else m)
-        # Mitsuba hands out three numbers and this takes four: the coarse and the fine half of one of them serve as two.
-        coarse = u * 2048
-        fine = coarse - dr.floor(coarse)
-        return frame.to_world(
-            mi.warp.square_to_cosine_hemisphere(mi.Point2f(dr.floor(coarse) / 2048 + fine / 2048, fine))
-        )
+    def _shaded(self, i, o, h, shadow_i, shadow_o):
+        """Area of the two shadows by the choice of masking: Lucas 2024, Eq. 17 or 18."""
+        if self.masking == "correlated":
+            return union(i, o, h, shadow_i, shadow_o)
+        return shadow_i.area + shadow_o.area
 
-    def _specular(self, si, wi, wo, grains: Grains, active):
-        """tau_0 D G F / (4 cos_i) (Lucas 2024, Eq. 22), and the density of reflection at visible normals times tau_i."""
+    def _weigh_specular(self, si, active, grains, wi):
+        return grains.visible(wi) * (1 - self._diffuse_part(si, active, wi))
+
+    def _draw_specular(self, si, active, grains, wi, u, sample2):
+        return mi.reflect(wi, self._visible_normal(grains, wi, sample2))
+
+    def _specular(self, si, active, grains: Grains, wi, wo):
+        """tau_0 D G F / (4 cos_i) (Lucas 2024, Eq. 22), by exact visible normals."""
         m = dr.normalize(wi + wo)
         h, d_ggx = normal_in_sphere_space(m, grains.beta_x, grains.beta_y)
         i, o = grains.to_sphere(wi), grains.to_sphere(wo)
-        fresnel = self._fresnel(si, dr.dot(wi, m), h, m, active)
+        fresnel = self._fresnel(si, active, dr.dot(wi, m), h, m)
+        reflected = dr.pi * grains.r * d_ggx / (4 * wi.z)
         if self.masking == "smith":
-            ndf = grains.r * exposure(grains.r, h, 0) / smith.filling_factor(grains.r)
-            gaf = smith.masking(grains.r, i) * smith.masking(grains.r, o) * smith.grain_weight(grains.r, i, o)
-            common = dr.pi * d_ggx / (4 * wi.z)
-            return fresnel * common * ndf * gaf, common / dr.pi * smith.visible_masking(i) * visible_fraction(
-                grains.r, i
-            )
+            value = reflected * exposure(grains.r, h, 0) * smith.masking_shadowing(grains.r, i, o)
+            return fresnel * value, d_ggx * smith.visible_masking(i) / (4 * wi.z)
         shadow_i, shadow_o = shadow(i, h), shadow(o, h)
-        common = dr.pi * grains.r * d_ggx / (4 * wi.z)
-        value = common * exposure(grains.r, h, self._shaded(i, o, h, shadow_i, shadow_o))
-        return fresnel * value, common * exposure(grains.r, h, shadow_i.area)
+        value = reflected * exposure(grains.r, h, self._shaded(i, o, h, shadow_i, shadow_o))
+        return fresnel * value, reflected * exposure(grains.r, h, shadow_i.area) / grains.visible(wi)
 
-    def _diffuse(self, si, wi, wo, grains: Grains, active):
-        """tau_0 f_d cos_o (Lucas 2024, Eq. 21), and the density of a cosine lobe about visible normals times tau_i."""
+    def _weigh_diffuse(self, si, active, grains, wi):
+        return grains.visible(wi) * self._diffuse_part(si, active, wi)
+
+    def _draw_diffuse(self, si, active, grains, wi, u, sample2):
+        """A cosine lobe about a visible normal; Smith's (2023) grains are flat instead.
+
+        Mitsuba hands out three numbers where this takes four: the coarse and the fine part of one of them serve as two.
+        """
+        if self.masking == "smith":
+            return mi.warp.square_to_cosine_hemisphere(sample2)
+        coarse = dr.floor(u * 2048)
+        cosine = mi.warp.square_to_cosine_hemisphere(mi.Point2f((coarse + 0.5) / 2048, u * 2048 - coarse))
+        return mi.Frame3f(self._visible_normal(grains, wi, sample2)).to_world(cosine)
+
+    def _diffuse(self, si, active, grains: Grains, wi, wo):
+        """tau_0 f_d cos_o (Lucas 2024, Eq. 21), by cosine lobes about visible normals."""
         coat = self._coat(si, active) if self.coated else None
         albedo = self.diffuse_reflectance.eval(si, active)
         if self.masking == "smith":
-            i, o = grains.to_sphere(wi), grains.to_sphere(wo)
             through = (1 - coat(wi.z)) * (1 - coat(wo.z)) if coat else 1
             cosine = wo.z / dr.pi
-            return albedo * smith.grain_weight(grains.r, i, o) * through * cosine, cosine * visible_fraction(
-                grains.r, i
-            )
+            return albedo * smith.grain_weight(grains.r, grains.to_sphere(wi), grains.to_sphere(wo)) * through * cosine, cosine
         first, second, pdf = lambertian(
-            *grains,
+            *grains[1:],
             wi,
             wo,
             self._shaded,
@@ -265,26 +299,37 @@ class Micrograin(Declared):
         value = albedo * first
         if self.variation != "none":
             value = value + self.diffuse_reflectance_2.eval(si, active) * second
-        return value, pdf
+        return value, pdf / grains.visible(wi)
 
-    def _shaded(self, i, o, h, shadow_i, shadow_o):
-        """Area of the two shadows by the choice of masking: Lucas 2024, Eq. 17 or 18."""
-        if self.masking == "correlated":
-            return union(i, o, h, shadow_i, shadow_o)
-        return shadow_i.area + shadow_o.area
+    def _weigh_multiple(self, si, active, grains, wi):
+        return dr.sum(self.table.seen(grains.tau_0, dr.normalize(wi)))
 
-    def _pores(self, wi, wo, grains: Grains):
-        """Share of the base that both directions reach, V_p (Lucas 2024, Eq. 23).
+    def _draw_multiple(self, si, active, grains, wi, u, sample2):
+        return mi.warp.square_to_cosine_hemisphere(sample2)
 
-        Below the surface nothing casts shadows, but light meets the base through pores only, from either side.
-        """
-        i, o = (grains.to_sphere(grains.lift(w)) for w in (wi, wo))
-        shadow_i, shadow_o = shadow(i, 0), shadow(o, 0)
-        both = exposure(grains.r, 0, self._shaded(i, o, 0, shadow_i, shadow_o))
+    def _multiple(self, si, active, grains: Grains, wi, wo):
+        """Light that single scattering loses (`compensation`), by cosine."""
+        seen_i, seen_o = (self.table.seen(grains.tau_0, dr.normalize(w)) for w in (wi, wo))
+        base = mi.UnpolarizedSpectrum(0)
+        if self.base is not None:
+            base = dr.clip(self._base_albedo(si, active), 0, 1)
+        value = lobe(grains.tau_0, self.table.at(grains.tau_0), seen_i, seen_o, self._mean_albedo(si, active), base)
+        return value * wo.z, wo.z / dr.pi
+
+    def _visible_normal(self, grains: Grains, wi, sample2):
+        i = grains.to_sphere(wi)
         if self.masking == "smith":
-            both = smith.pore_weight(grains.r, i, o)
-        one = exposure(grains.r, 0, dr.select(wi.z > 0, shadow_i.area, 0) + dr.select(wo.z > 0, shadow_o.area, 0))
-        return dr.select((wi.z > 0) & (wo.z > 0), both, one)
+            m = smith.sample_visible_normal(i, sample2.x, sample2.y)
+        else:
+            m = sample_visible_normal(grains.r, i, sample2.x, sample2.y)
+        return dr.normalize(mi.Normal3f(grains.beta_x * m.x, grains.beta_y * m.y, m.z))
+
+    def _diffuse_part(self, si, active, wi):
+        """Probability of the diffuse lobe among the grains' (Lucas 2024, Eq. 27)."""
+        if not self.coated:
+            return 0 if self.specular else 1
+        albedo = dr.mean(self.diffuse_reflectance.eval(si, active))
+        return albedo / (albedo + self._coat(si, active)(wi.z))
 
     def _share(self, si, active):
         """Function (h, m) for the second colour's share at a point of the grain, or None."""
@@ -300,10 +345,42 @@ class Micrograin(Declared):
         eta = self.int_ior.eval_1(si, active) / self.ext_ior.eval_1(si, active)
         return lambda cos: mi.fresnel(cos, eta)[0]
 
-    def _fresnel(self, si, cos, h, m, active):
+    def _mean_albedo(self, si, active):
+        """Hemispherical mean of what a facet of the grain reflects."""
+        reflect, cosines = self._fresnel if self.specular else None, zip(*gauss_legendre(4))
+        mean = mi.UnpolarizedSpectrum(0)
+        if reflect:
+            mean = sum(2 * cos * weight * reflect(si, active, mi.Float(cos), 0.5, mi.Vector3f(0, 0, 1)) for cos, weight in cosines)
+        if self.diffuse:
+            albedo = self.diffuse_reflectance.eval(si, active)
+            if self.variation != "none":
+                albedo = (albedo + self.diffuse_reflectance_2.eval(si, active)) / 2
+            mean = mean + dr.square(1 - mean) * albedo
+        return mean
+
+    def _base_albedo(self, si, active):
+        """Mitsuba's diffuse reflectance where it is right, else the directional albedo at normal incidence."""
+        beyond_diffuse = int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Transmission)
+        if not self.base.flags() & beyond_diffuse:
+            return mi.unpolarized_spectrum(self.base.eval_diffuse_reflectance(si, active))
+        upright = mi.SurfaceInteraction3f(si)
+        upright.wi = mi.Vector3f(0, 0, 1)
+
+        def reflected(ctx, si, sample1, sample2, active):
+            bs, weight = self.base.sample(ctx, si, sample1, sample2, active)
+            return bs, mi.unpolarized_spectrum(weight) & (bs.wo.z > 0)
+
+        return directional_albedo(reflected, upright, active, 16)
+
+    def _constant(self, beta) -> float:
+        if beta.is_spatially_varying():
+            raise ParameterError('beta: a texture, which scattering = "multiple" does not allow; tau_0 may be one.')
+        return float(np.asarray(beta.mean()).item())
+
+    def _fresnel(self, si, active, cos, h, m):
         """Reflectance of the grain at height ``h`` with normal ``m``."""
         if self.coated:
-            return self._coat(si, active)(cos)
+            return mi.UnpolarizedSpectrum(self._coat(si, active)(cos))
         if self.metal.mirror and self.variation == "none":
             return mi.UnpolarizedSpectrum(1)
         eta, k = self.metal.eval(si, active)
@@ -312,6 +389,11 @@ class Micrograin(Declared):
             eta_2, k_2 = self.metal_2.eval(si, active)
             eta, k = dr.lerp(eta, eta_2, share), dr.lerp(k, k_2, share)
         return conductor(cos, eta, k)
+
+
+def _rescale(u, start, chance):
+    """Stretch what is left of a random number after a choice to [0, 1)."""
+    return dr.clip((u - start) / dr.maximum(chance, TINY), 0, ONE_BELOW)
 
 
 def conflict(first: set[str], second: set[str], why: str = "give one or the other") -> None:

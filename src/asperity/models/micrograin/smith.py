@@ -15,11 +15,7 @@ from .grains import exposure, visible_fraction
 from .shadows import GRAZING, inclination, silhouette
 
 HEIGHTS = 12
-
-
-def filling_factor(r):
-    """tau_0, kept off zero: the NDF divides by it."""
-    return dr.maximum(one_minus_exp(dr.pi * r), 1e-7)
+TINY = 1e-7
 
 
 def masking(r, w):
@@ -31,7 +27,17 @@ def masking(r, w):
         return (2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha) * exposure(r, h, 0),)
 
     (projected,) = integrate(width, HEIGHTS, r * cos)
-    return dr.minimum(cos * filling_factor(r) / (dr.maximum(r, 1e-7 / dr.pi) * projected), 1)
+    return dr.minimum(cos * filling_factor(r) / (dr.maximum(r, TINY) * projected), 1)
+
+
+def masking_shadowing(r, i, o):
+    """G1(i) G1(o) w+(i, o) / tau_0: the filling factor of Lucas 2024, Eq. 20 was w+ before."""
+    return masking(r, i) * masking(r, o) * grain_weight(r, i, o) / filling_factor(r)
+
+
+def filling_factor(r):
+    """tau_0, kept off zero."""
+    return one_minus_exp(dr.pi * dr.maximum(r, TINY))
 
 
 def grain_weight(r, i, o):

@@ -1,0 +1,74 @@
+"""``asperity check``."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+from rich.text import Text
+
+from asperity.errors import ParameterError
+
+from . import console, materials, output, variants
+
+VERDICT = {True: ("passed", "green"), False: ("failed", "bold red"), None: ("skipped", "dim")}
+
+
+def check(
+    target: Annotated[str | None, typer.Argument(metavar="BSDF", help="A model, or any BSDF of Mitsuba.")] = None,
+    settings: materials.Settings = None,
+    preset: materials.PresetName = None,
+    material: materials.MaterialFile = None,
+    pictures: Annotated[Path, typer.Option(help="Folder for pictures of what failed.")] = Path("asperity-check"),
+    variant: variants.Variant = None,
+) -> None:
+    """Check a BSDF: sampling, reciprocity, energy, gradients and more. The exit code is 1 if a check fails."""
+    if sum(way is not None for way in (target, preset, material)) != 1:
+        raise ParameterError("give one of: the name of a BSDF, --preset, --material.")
+    name = target or preset or material.stem  # type: ignore[union-attr]
+    description: dict[str, Any] = {"type": target}
+    if target:
+        materials.apply(description, settings or [])
+    else:
+        description = materials.chosen(preset, material, settings).material
+    with console.stderr().status("loading"):
+        variants.choose(variant)
+        materials.check_material(description)
+        from asperity.lab import checks
+
+    with console.progress("checks") as progress:
+        task = progress.add_task("", total=len(checks.NAMES))
+        results = checks.check(
+            description, lambda name, done, _: progress.update(task, description=name, completed=done)
+        )
+    report(results)
+    failures = [result for result in results if result.passed is False]
+    draw(failures, name, pictures)
+    raise typer.Exit(1 if failures else 0)
+
+
+def report(results: list[Any]) -> None:
+    """Print the table."""
+    table = Table("check", "verdict", "measured", "bound")
+    for result in results:
+        verdict, style = VERDICT[result.passed]
+        table.add_row(result.name, Text(verdict, style), result.measured, result.bound)
+    console.stdout().print(table)
+
+
+def draw(failures: list[Any], name: str, folder: Path) -> None:
+    """Write a picture of each failure that measured something, and print where."""
+    from asperity.lab import pictures
+
+    for result in failures:
+        if result.evidence is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            slug = re.sub(r"\W+", "-", unicodedata.normalize("NFKD", result.name))  # chi², with a plain 2
+            path = folder / f"{name}-{slug}.png"
+            with output.atomically(path) as part:
+                pictures.draw(result, part)
+            typer.echo(path)

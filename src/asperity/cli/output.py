@@ -1,0 +1,69 @@
+"""The files that ``asperity render`` writes: whole, or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import TYPE_CHECKING
+
+from asperity.errors import ParameterError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+NAME = Path("asperity")
+FORMATS = (".png", ".exr")
+
+
+def targets(out: Path) -> list[Path]:
+    """The files to write, one for each format if ``out`` has no ending; raises if that cannot work."""
+    if out.is_dir():
+        out = out / NAME
+    if out.suffix and out.suffix.lower() not in FORMATS:
+        raise ParameterError(
+            f"-o {out}: the ending is {out.suffix!r}. Allowed: {', '.join(FORMATS)}, or none for both."
+        )
+    try:
+        with TemporaryFile(dir=out.parent):
+            pass
+    except OSError as error:
+        raise ParameterError(
+            f"-o {out}: cannot write into the folder {str(out.parent)!r}: {error.strerror}."
+        ) from error
+    return [out] if out.suffix else [out.with_suffix(suffix) for suffix in FORMATS]
+
+
+@contextmanager
+def atomically(path: Path) -> Iterator[Path]:
+    """A file beside ``path`` to write to, which takes its place in the end, or vanishes."""
+    part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write(path: Path, image: np.ndarray, layers: list[str]) -> None:
+    """Write an image (height, width, channels) of linear radiance: to EXR as it is, to PNG in sRGB, clipped at 1.
+
+    ``layers`` names the channels that are not colour (AOVs), which come last; integrators that name all leave none.
+    """
+    import mitsuba as mi
+    import numpy as np
+
+    channels = image.shape[-1]
+    colours = channels - len(layers)
+    image = image.astype(np.float32)
+    with atomically(path) as part:
+        if path.suffix.lower() == ".exr":
+            names = [*"RGBA"[:colours], *layers]
+            kind = mi.Bitmap.PixelFormat.MultiChannel
+            bitmap = mi.Bitmap(image, kind, names) if layers else mi.Bitmap(image)
+        else:
+            bitmap = mi.Bitmap(image[..., : colours or min(channels, 3)])
+            bitmap = bitmap.convert(component_format=mi.Struct.Type.UInt8, srgb_gamma=True)
+        bitmap.write(str(part))

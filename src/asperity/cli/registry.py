@@ -1,0 +1,30 @@
+"""The models, by name."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+from asperity.errors import UnknownNameError
+
+
+def models() -> dict[str, Any]:
+    """All models."""
+    # Before the models, which import it: its arrival registers them, for which they have to be there.
+    import mitsuba  # noqa: F401
+
+    from asperity.models import MODELS
+
+    return MODELS
+
+
+def model(name: str) -> Any:
+    """The model of that name."""
+    if name not in models():
+        raise UnknownNameError("model", name, models())
+    return models()[name]
+
+
+def about(model: Any) -> str:
+    """The docstring of a model, without its quotation marks for code."""
+    return inspect.getdoc(model).replace("``", "")  # type: ignore[union-attr]  # D1: all models have one

@@ -1,0 +1,35 @@
+"""Which Mitsuba variant a command runs in."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from asperity import llvm
+from asperity.errors import ParameterError, UnknownNameError
+
+Variant = Annotated[str | None, typer.Option(help="Mitsuba variant; llvm_ad_rgb if LLVM works, else scalar_rgb.")]
+
+
+def choose(variant: str | None) -> None:
+    """Set the variant that was asked for, or the fastest that works on any machine."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if variant is not None and variant not in mi.variants():
+        raise UnknownNameError("variant", variant, mi.variants())
+    if variant is not None and variant.startswith("cuda_") and not dr.has_backend(dr.JitBackend.CUDA):
+        raise ParameterError(f"--variant {variant}: Dr.Jit finds no NVIDIA GPU. `asperity doctor` shows what works.")
+    mi.set_variant(variant or working())
+    mi.set_log_level(mi.LogLevel.Error)
+
+
+def working() -> str:
+    """``llvm_ad_rgb``, unless LLVM is missing or too old."""
+    import drjit as dr
+
+    if dr.has_backend(dr.JitBackend.LLVM) and llvm.complaint() is None:
+        return "llvm_ad_rgb"
+    typer.echo("warning: no LLVM that works, so this is very slow (scalar_rgb): see `asperity doctor`.", err=True)
+    return "scalar_rgb"

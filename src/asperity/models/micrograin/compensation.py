@@ -1,0 +1,169 @@
+"""Returns the energy that grains and base pass on to each other: a compensation lobe with two species.
+
+Not in the paper, whose model is single scattering. The idea is Kulla and Conty's (2017), for two materials: light that is
+lost after meeting a grain or the base first is returned spread like that loss. How often it meets either again follows
+from the exact form factors of the furnace. Reciprocal; closes the white furnace; no fitted constants.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from scipy.stats import qmc
+
+from .grains import density, sample_visible_normal, visible_fraction
+from .shadows import lift, shadow, to_sphere, union
+
+FILLINGS, COSINES, AZIMUTHS = 25, 32, 7
+"""Nodes of the tables: in arcsin(sqrt(tau_0)), in the root of the cosine, and in the azimuth of the first quadrant."""
+SAMPLES = 4096
+
+
+class Loss(NamedTuple):
+    """What single scattering loses at one filling factor if all is white, and how often it would be met again."""
+
+    mean_grain: Any  # hemispherical means of the two losses
+    mean_base: Any
+    visible: Any  # hemispherical mean of the grains' visible fraction, tau_avg
+    area: Any  # exposed area of the grains over that of the plane, H_S
+
+
+class LossTable:
+    """Losses for constant ``beta_x`` and ``beta_y`` and any filling factor; ``diffuse`` grains, or mirrors."""
+
+    def __init__(self, beta_x: float, beta_y: float, diffuse: bool):
+        self.azimuths = 1 if beta_x == beta_y else AZIMUTHS
+        tau_0 = np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2  # dense at both ends
+        root = (np.arange(COSINES) + 0.5) / COSINES
+        azimuth = np.linspace(0, np.pi / 2, self.azimuths)
+        grid = np.meshgrid(tau_0, root**2, azimuth, indexing="ij")
+        losses, visible = _losses(*grid, beta_x, beta_y, diffuse)
+        self.losses = _table(mi.Texture3f, losses)
+        turn = np.ones(1) if self.azimuths == 1 else np.r_[0.5, np.ones(self.azimuths - 2), 0.5] / (self.azimuths - 1)
+        mean = np.einsum("tcax,c,a->tx", np.concatenate([losses, visible], axis=-1), _cosine_weights(root), turn)
+        self.means = _table(mi.Texture1f, np.column_stack([mean, _exposed_area(tau_0, beta_x, beta_y)]))
+
+    def at(self, tau_0) -> Loss:
+        """What depends on the filling factor alone."""
+        return Loss(*self.means.eval(_centre(_filling(tau_0), FILLINGS)))
+
+    def seen(self, tau_0, w):
+        """(L_S, L_B): shares of the light along the unit vector ``w`` that meet grain or base first and are lost."""
+        azimuth = dr.atan2(dr.abs(w.y), dr.abs(w.x) + 1e-20) * (2 / dr.pi)
+        root = dr.sqrt(dr.clip(w.z, 1e-8, 1))
+        return self.losses.eval(mi.Point3f(_centre(azimuth, self.azimuths), root, _centre(_filling(tau_0), FILLINGS)))
+
+
+def lobe(tau_0, loss: Loss, seen_i, seen_o, grain, base):
+    """BRDF of the returned light, for albedos ``grain`` and ``base`` (spectra) and losses (L_S, L_B) along i and o.
+
+    ``blocked`` and ``between`` are the fluxes that grains pass to grains, and to the base and back.
+    """
+    between = dr.maximum(loss.visible - tau_0, 1e-6)
+    lost = dr.maximum(loss.area - loss.visible, 1e-6)
+    blocked = dr.maximum(lost - between, 0)
+
+    def exchange(grain, base):
+        """The matrix S: (grain-grain, grain-base, base-base)."""
+        x, y = grain / loss.area, base / dr.maximum(1 - tau_0, 1e-6)
+        scale = dr.rcp(1 - blocked * x - between * between * x * y)
+        return (blocked + between * between * y) / (lost * lost) * scale, scale / lost, x * scale
+
+    # d_S, d_B: the symmetric scaling that makes the lobe return, in the white furnace, exactly what was lost.
+    s, m, b = exchange(1, 1)
+    mean_s, mean_b = dr.maximum(loss.mean_grain, 1e-7), dr.maximum(loss.mean_base, 1e-7)
+    middle = m * (mean_s - mean_b)
+    ratio = (dr.sqrt(middle * middle + 4 * s * b * mean_s * mean_b) - middle) / (2 * b * mean_b)
+    d_s = dr.rsqrt(s * mean_s + m * mean_b * ratio)
+    d_b = ratio * d_s
+
+    s, m, b = exchange(grain, base)
+    s_i, s_o = grain * (d_s * seen_i[0]), grain * (d_s * seen_o[0])
+    b_i, b_o = base * (d_b * seen_i[1]), base * (d_b * seen_o[1])
+    return (s_i * s * s_o + m * (s_i * b_o + b_i * s_o) + b_i * b * b_o) / dr.pi
+
+
+def _losses(tau_0, cos, azimuth, beta_x, beta_y, diffuse):
+    """(L_S, L_B) and tau_i on a grid of filling factors and directions, by quasi-Monte Carlo."""
+    Float, Vector = _array_types()  # noqa: N806
+
+    def spread(x):
+        return dr.repeat(Float(np.ascontiguousarray(x.ravel(), dtype=np.float32)), SAMPLES)
+
+    sin = np.sqrt(1 - cos * cos)
+    wi = Vector(spread(sin * np.cos(azimuth)), spread(sin * np.sin(azimuth)), spread(cos))
+    wi, r = lift(wi, beta_x, beta_y), density(spread(tau_0))
+    i = to_sphere(wi, beta_x, beta_y)
+    points = qmc.Sobol(4, seed=0).random(SAMPLES).T.astype(np.float32)
+    u = [dr.tile(Float(np.minimum(point, np.float32(1 - 2**-24))), cos.size) for point in points]
+
+    m = sample_visible_normal(r, i, u[0], u[1])
+    h, m = m.z, dr.normalize(Vector(beta_x * m.x, beta_y * m.y, m.z))
+    cosine = _cosine_hemisphere(Vector, u[2], u[3])
+    wo = _about(m, cosine) if diffuse else 2 * dr.dot(wi, m) * m - wi
+
+    def blocked(wo, h):  # of what is seen along i at height h, the share that is in shadow along wo
+        o = to_sphere(lift(wo, beta_x, beta_y), beta_x, beta_y)
+        shadow_i, shadow_o = shadow(i, h), shadow(o, h)
+        return 1 - dr.select(wo.z > 0, dr.exp(-r * (union(i, o, h, shadow_i, shadow_o) - shadow_i.area)), 0)
+
+    visible = visible_fraction(r, i)
+    columns = visible * blocked(wo, h), (1 - visible) * blocked(cosine, Float(0)), visible
+    columns = [dr.block_sum(column, SAMPLES).numpy().reshape(cos.shape) / SAMPLES for column in columns]
+    return np.stack(columns[:2], axis=-1), columns[2][..., None]
+
+
+def _exposed_area(tau_0, beta_x, beta_y):
+    """H_S = tau_0 int D dm = r int int exp(-r pi (1 - h^2)) |E m'| dh dphi."""
+    r = -np.log1p(-np.minimum(tau_0, 1 - 1e-6))[:, None, None] / np.pi
+    h, azimuth = ((np.arange(64) + 0.5) / 64)[:, None], (np.arange(64) + 0.5) / 64 * 2 * np.pi
+    x, y = (np.sqrt(1 - h * h) * f(azimuth) for f in (np.cos, np.sin))
+    stretch = np.sqrt((beta_x * x) ** 2 + (beta_y * y) ** 2 + h * h)
+    return (r * np.exp(-r * np.pi * (1 - h * h)) * stretch).mean(axis=(1, 2)) * 2 * np.pi
+
+
+def _cosine_weights(root):
+    """Weights of 2 int L cos dcos for an L that is linear in the root of the cosine between the nodes."""
+    x = (np.arange(1 << 13) + 0.5) / (1 << 13)
+    hats = np.array([np.interp(x, root, unit) for unit in np.eye(len(root))])
+    return (hats * 4 * x**3).mean(axis=1)
+
+
+def _table(texture, data):
+    data = mi.TensorXf(np.ascontiguousarray(data, dtype=np.float32))
+    return texture(data, filter_mode=dr.FilterMode.Linear, wrap_mode=dr.WrapMode.Clamp)
+
+
+def _centre(x, n: int):
+    """Texture coordinate at which a table of ``n`` nodes from 0 to 1 has the value for x."""
+    return (x * (n - 1) + 0.5) / n
+
+
+def _filling(tau_0):
+    """The tables' coordinate in [0, 1]."""
+    return dr.atan2(dr.sqrt(dr.maximum(tau_0, 1e-6)), dr.sqrt(dr.maximum(1 - tau_0, 1e-6))) * (2 / dr.pi)
+
+
+def _array_types():
+    """Arrays to compute tables with: the variant's own, or LLVM's where that is scalar."""
+    if dr.is_jit_v(mi.Float):
+        return mi.Float, mi.Vector3f
+    import drjit.llvm as llvm
+
+    return llvm.Float, llvm.Array3f
+
+
+def _cosine_hemisphere(Vector, u, v):  # noqa: N803
+    radius, (sin, cos) = dr.sqrt(u), dr.sincos(2 * dr.pi * v)
+    return Vector(radius * cos, radius * sin, dr.safe_sqrt(1 - u))
+
+
+def _about(n, w):
+    """Turn ``w`` from about the z axis to about ``n`` (Duff et al. 2017), n.z >= 0."""
+    a = -dr.rcp(1 + n.z)
+    b = n.x * n.y * a
+    s, t = type(n)(1 + n.x * n.x * a, b, -n.x), type(n)(b, 1 + n.y * n.y * a, -n.y)
+    return s * w.x + t * w.y + n * w.z
