@@ -91,7 +91,7 @@ class Texture(Parameter):
 
     def parse(self, props: mi.Properties) -> Any:
         """A ``mi.Texture``, or None if none is given and there is no default."""
-        if props.has_property(self.name):
+        if self.name in props:
             return self.texture(props, self.name)
         return None if self.default is None else props.get_unbounded_texture(self.name, self.default)
 
@@ -201,7 +201,7 @@ class Conductor(Parameter):
     def parse(self, props: mi.Properties) -> Any:
         """A `Complex`, or None if nothing is given and there is no default."""
         material, eta, k, reflectivity, edge_tint = self.names()
-        ways = [way for way in ((material,), (eta, k), (reflectivity, edge_tint)) if any(map(props.has_property, way))]
+        ways = [way for way in ((material,), (eta, k), (reflectivity, edge_tint)) if any(name in props for name in way)]
         if len(ways) > 1:
             raise ParameterError(f"{' and '.join(way[0] for way in ways)} exclude each other: give one metal, one way.")
         if not ways or ways[0] == (material,):
@@ -209,12 +209,12 @@ class Conductor(Parameter):
             return None if name is None else self._named(name, material)
         if ways[0] == (eta, k):
             for name, other in ((eta, k), (k, eta)):
-                if not props.has_property(name):
+                if name not in props:
                     raise ParameterError(f"{other} is given without {name}: a metal's index needs both.")
             return Complex(*(_index(name, low).texture(props, name) for name, low in ((eta, 1e-3), (k, 0.0))))
-        if not props.has_property(reflectivity):
+        if reflectivity not in props:
             raise ParameterError(f"{edge_tint} is given without {reflectivity}.")
-        tint = props.get_texture(edge_tint, 0.0) if not props.has_property(edge_tint) else None
+        tint = props.get_texture(edge_tint, 0.0) if edge_tint not in props else None
         return Complex(
             reflectivity=_colour(reflectivity).texture(props, reflectivity),
             edge_tint=tint or _colour(edge_tint).texture(props, edge_tint),
@@ -322,12 +322,12 @@ class BSDF(Parameter):
 
     def parse(self, props: mi.Properties) -> Any:
         """The nested plugin, or None."""
-        name = next((n for n in (self.name, *props.keys()) if is_unnamed(n) or props.has_property(self.name)), None)
+        name = next((n for n in (self.name, *props.keys()) if is_unnamed(n) or self.name in props), None)
         if name is None:
             return None
         given = props[name]
         if not isinstance(given, mi.BSDF):
-            raise self.wrong(self.name, repr(given))
+            raise self.wrong(self.name, given.class_name() if isinstance(given, mi.Object) else repr(given))
         return given
 
 
@@ -410,6 +410,8 @@ def _numbers(texture: Any) -> Iterable[tuple[str, np.ndarray]]:
         if key.rsplit(".", 1)[-1] not in ("value", "values", "data") or dr.grad_enabled(data):
             continue
         numbers = np.asarray(data)
+        if numbers.dtype == np.uint8:
+            numbers = numbers / 255
         # In spectral variants Mitsuba keeps colours as three coefficients, which have no range.
         if not (mi.is_spectral and numbers.size > 1 and 3 in (numbers.shape[0], numbers.shape[-1])):
             yield key, numbers

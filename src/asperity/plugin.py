@@ -13,7 +13,6 @@ import mitsuba as mi
 
 from . import llvm
 from .microfacet.albedo import directional_albedo
-from .models import MODELS, TEXTURES
 
 ALBEDO_SAMPLES = 256
 
@@ -27,6 +26,8 @@ def register() -> None:
 
 
 def _switched(_old: str | None, new: str | None) -> None:
+    from .models import MODELS, TEXTURES  # they import Mitsuba, whose import may be what brought us here
+
     llvm.guard(new)
     for name, model in MODELS.items():
         mi.register_bsdf(name, _bsdf(model, new))

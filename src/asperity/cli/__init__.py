@@ -9,21 +9,16 @@ import typer
 
 from asperity import __version__
 
-from .check import check
-from .cite import cite
-from .doctor import doctor
+from . import check, cite, doctor, list, render, show
 from .errors import OneLineErrors
-from .list import list_all
-from .render import render
-from .show import show
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    "render": render,
-    "list": list_all,
-    "show": show,
-    "cite": cite,
-    "check": check,
-    "doctor": doctor,
+    "render": render.render,
+    "list": list.list_all,
+    "show": show.show,
+    "cite": cite.cite,
+    "check": check.check,
+    "doctor": doctor.doctor,
 }
 """In the order of the help."""
 

@@ -35,7 +35,7 @@ def check(
         materials.apply(description, settings or [])
     else:
         description = materials.chosen(preset, material, settings).material
-    with console.stderr().status("loading"):
+    with console.status("loading"):
         variants.choose(variant)
         materials.check_material(description)
         from asperity.lab import checks

@@ -9,6 +9,7 @@ from rich.console import Console
 
 if TYPE_CHECKING:
     from rich.progress import Progress
+    from rich.status import Status
 
 WIDTH = 120
 """Of tables that go to a file or a pipe."""
@@ -20,8 +21,15 @@ def stdout() -> Console:
 
 
 def stderr() -> Console:
-    """The console for progress."""
-    return Console(stderr=True, markup=False, highlight=False)
+    """The console for progress, which a file or a pipe does not want."""
+    console = Console(stderr=True, markup=False, highlight=False)
+    console.quiet = not console.is_terminal
+    return console
+
+
+def status(text: str) -> Status:
+    """A spinner."""
+    return stderr().status(text)
 
 
 def progress(unit: str) -> Progress:

@@ -32,7 +32,7 @@ def doctor() -> None:
         facts.add_row(*row)
     trials, advice, works = Table("variant", "works", "details"), [], {}
     for variant in TRIALS:
-        with console.stderr().status(f"trying {variant}"):
+        with console.status(f"trying {variant}"):
             works[variant], details = attempt(variant)
         trials.add_row(variant, "yes" if works[variant] else "no", details)
         if not works[variant]:

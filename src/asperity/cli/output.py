@@ -47,23 +47,21 @@ def atomically(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
-def write(path: Path, image: np.ndarray, layers: list[str]) -> None:
+def write(path: Path, image: np.ndarray, names: list[str]) -> None:
     """Write an image (height, width, channels) of linear radiance: to EXR as it is, to PNG in sRGB, clipped at 1.
 
-    ``layers`` names the channels that are not colour (AOVs), which come last; integrators that name all leave none.
+    ``names`` are those of the channels: colours first, then perhaps others (AOVs), for which PNG has no place.
     """
     import mitsuba as mi
     import numpy as np
 
-    channels = image.shape[-1]
-    colours = channels - len(layers)
     image = image.astype(np.float32)
     with atomically(path) as part:
         if path.suffix.lower() == ".exr":
-            names = [*"RGBA"[:colours], *layers]
-            kind = mi.Bitmap.PixelFormat.MultiChannel
-            bitmap = mi.Bitmap(image, kind, names) if layers else mi.Bitmap(image)
+            bitmap = mi.Bitmap(image, mi.Bitmap.PixelFormat.MultiChannel, names)
         else:
-            bitmap = mi.Bitmap(image[..., : colours or min(channels, 3)])
+            letters = "".join(name[-1] for name in names)
+            colours = next(len(kind) for kind in ("RGBA", "RGB", letters[:1]) if letters.startswith(kind))
+            bitmap = mi.Bitmap(image[..., :colours])
             bitmap = bitmap.convert(component_format=mi.Struct.Type.UInt8, srgb_gamma=True)
         bitmap.write(str(part))

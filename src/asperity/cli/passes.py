@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 PASSES = (16, 4, 1)
 """Samples per pixel of a pass: squares, which every sampler of Mitsuba can stratify."""
-LANES = 2**22
+LANES = 2**21
 """Samples of a pass, at most: enough to fill any processor, few enough for its memory."""
 
 

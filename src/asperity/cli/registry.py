@@ -10,9 +10,6 @@ from asperity.errors import UnknownNameError
 
 def models() -> dict[str, Any]:
     """All models."""
-    # Before the models, which import it: its arrival registers them, for which they have to be there.
-    import mitsuba  # noqa: F401
-
     from asperity.models import MODELS
 
     return MODELS

@@ -16,8 +16,11 @@ from . import console, materials, output, passes, scene_files, variants
 if TYPE_CHECKING:
     import numpy as np
 
-SIZE, SPP = (640, 640), 64
-"""Of a preview: half a minute from the prompt to the picture on two cores."""
+SIZE, SPP = (512, 512), 64
+"""Of a preview: about 20 s of processor time from the prompt to the picture."""
+
+PREVIEW = ("preset", "material", "set", "object", "env", "compare")
+"""Options that make no sense with a scene file."""
 
 NEXT = (
     "asperity list",
@@ -55,55 +58,37 @@ def render(
     """Render a material on the preview scene, or a scene file, to a PNG and an EXR."""
     start = time.perf_counter()
     files = output.targets(out)
-    options = {
-        "preset": preset,
-        "material": material,
-        "set": settings,
-        "object": object_,
-        "env": env,
-        "compare": compare,
-    }
-    given = [f"--{name}" for name, value in options.items() if value]
+    values = (preset, material, settings, object_, env, compare)
+    given = {name: value for name, value in zip(PREVIEW, values) if value not in (None, [])}
     if scene and given:
-        raise ParameterError(f"{', '.join(given)}: a scene file has its own materials, objects and lights.")
-    with console.stderr().status("loading the scene"):
+        raise ParameterError(f"--{', --'.join(given)}: a scene file has its own materials, objects and lights.")
+    with console.status("loading the scene"):
         variants.choose(variant)
-        if scene:
-            scenes = [scene_files.load(scene, size)]
-            spp = spp or scenes[0].sensors()[0].sampler().sample_count()
-        else:
-            scenes, spp = previews(preset, material, settings, compare, object_, env, size or SIZE), spp or SPP
+        scenes = [scene_files.load(scene, size)] if scene else previews(given, size or SIZE)
+        spp = spp or (scenes[0].sensors()[0].sampler().sample_count() if scene else SPP)
     loaded = time.perf_counter()
 
     images, done = passes.average(scenes, spp, seed)
     image = beside(*images) if compare else images[0]
+    names = scene_files.channel_names(scenes[0], image.shape[-1])
     for file in files:
-        output.write(file, image, scenes[0].integrator().aov_names())
+        output.write(file, image, names)
     rendered = time.perf_counter()
-    typer.echo(
-        f"{'stopped early: ' if done < spp else ''}{' and '.join(map(str, files))}: {done} samples per pixel, ",
-        nl=False,
-    )
-    typer.echo(f"{rendered - start:.1f} s (loading {loaded - start:.1f}, rendering {rendered - loaded:.1f})")
+    written = f"{'stopped early: ' if done < spp else ''}{' and '.join(map(str, files))}: {done} samples per pixel"
+    times = f"{rendered - start:.1f} s (loading {loaded - start:.1f}, rendering {rendered - loaded:.1f})"
+    typer.echo(f"{written}, {times}")
     if not (scene or given):
         typer.echo("\n  ".join(("Try next:", *NEXT)))
 
 
-def previews(
-    preset: str | None,
-    material: Path | None,
-    settings: list[str] | None,
-    compare: str | None,
-    object_: str | None,
-    env: str | None,
-    size: tuple[int, int],
-) -> list[Any]:
-    """The preview scene with the chosen material, and the same scene with the one to compare with."""
-    first = materials.chosen(preset, material, settings)
-    shown = [first, *([materials.chosen(compare, None, None)] if compare else [])]
-    view = first.preview | {name: value for name, value in (("object", object_), ("env", env)) if value}
+def previews(given: dict[str, Any], size: tuple[int, int]) -> list[Any]:
+    """The preview scene with the given material, and perhaps the same scene with the one to compare with."""
+    shown = [materials.chosen(given.get("preset"), given.get("material"), given.get("set"))]
+    if "compare" in given:
+        shown.append(materials.chosen(given["compare"], None, None))
     for one in shown:
         materials.check_material(one.material)
+    view = shown[0].preview | {name: given[name] for name in ("object", "env") if name in given}
 
     import mitsuba as mi
 
@@ -117,9 +102,8 @@ def beside(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     import numpy as np
 
     difference = np.abs(a - b)
-    # A power of two; the brightest percent may clip.
-    brightest = np.quantile(difference, 0.99)
-    factor = 2.0 ** max(0, np.floor(-np.log2(brightest))) if brightest else 1.0
+    # A power of two; the brightest percent may clip, and rounding errors stay dark.
+    factor = 2.0 ** np.clip(np.floor(-np.log2(np.quantile(difference, 0.99) + 1e-9)), 0, 8)
     error = difference.mean() / ((a + b).mean() / 2)
     typer.echo(
         f"mean difference: {difference.mean():.3g} or {error:.2%} of the mean; shown times {factor:g}, at the right"

@@ -65,3 +65,17 @@ def resize(sensor: Any, size: tuple[int, int]) -> None:
     parameters["film.size"] = parameters["film.crop_size"] = list(size)
     parameters["film.crop_offset"] = [0, 0]
     parameters.update()
+
+
+def channel_names(scene: Any, channels: int) -> list[str]:
+    """Names of the channels of a rendered image, colours first.
+
+    The film does not tell: it counts the colours twice if an ``aov`` integrator holds another one, which names its
+    colours too, and it counts some if there is none, where the image has only what the integrator names.
+    """
+    own = scene.integrator().aov_names()
+    if channels == len(own):
+        return own
+    every = [channel.name for channel in scene.sensors()[0].film().bitmap().struct_()]
+    colours = len(every) - len(own)
+    return every[:colours] + own[len(own) - (channels - colours) :]

@@ -36,25 +36,28 @@ class LossTable:
 
     def __init__(self, beta_x: float, beta_y: float, diffuse: bool):
         self.azimuths = 1 if beta_x == beta_y else AZIMUTHS
-        tau_0 = np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2  # dense at both ends
+        tau_0 = np.maximum(np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2, 1e-4)  # dense at both ends
         root = (np.arange(COSINES) + 0.5) / COSINES
         azimuth = np.linspace(0, np.pi / 2, self.azimuths)
         grid = np.meshgrid(tau_0, root**2, azimuth, indexing="ij")
         losses, visible = _losses(*grid, beta_x, beta_y, diffuse)
-        self.losses = _table(mi.Texture3f, losses)
+        # All of it is proportional to tau_0 where that is small, so the tables hold the ratio to it.
+        self.losses = _table(mi.Texture3f, losses / tau_0[:, None, None, None])
         turn = np.ones(1) if self.azimuths == 1 else np.r_[0.5, np.ones(self.azimuths - 2), 0.5] / (self.azimuths - 1)
         mean = np.einsum("tcax,c,a->tx", np.concatenate([losses, visible], axis=-1), _cosine_weights(root), turn)
-        self.means = _table(mi.Texture1f, np.column_stack([mean, _exposed_area(tau_0, beta_x, beta_y)]))
+        means = np.column_stack([mean, _exposed_area(tau_0, beta_x, beta_y)])
+        self.means = _table(mi.Texture1f, means / tau_0[:, None])
 
     def at(self, tau_0) -> Loss:
         """What depends on the filling factor alone."""
-        return Loss(*self.means.eval(_centre(_filling(tau_0), FILLINGS)))
+        return Loss(*(tau_0 * mean for mean in self.means.eval(_centre(_filling(tau_0), FILLINGS))))
 
     def seen(self, tau_0, w):
         """(L_S, L_B): shares of the light along the unit vector ``w`` that meet grain or base first and are lost."""
         azimuth = dr.atan2(dr.abs(w.y), dr.abs(w.x) + 1e-20) * (2 / dr.pi)
         root = dr.sqrt(dr.clip(w.z, 1e-8, 1))
-        return self.losses.eval(mi.Point3f(_centre(azimuth, self.azimuths), root, _centre(_filling(tau_0), FILLINGS)))
+        at = mi.Point3f(_centre(azimuth, self.azimuths), root, _centre(_filling(tau_0), FILLINGS))
+        return [tau_0 * loss for loss in self.losses.eval(at)]
 
 
 def lobe(tau_0, loss: Loss, seen_i, seen_o, grain, base):

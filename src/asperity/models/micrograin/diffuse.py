@@ -98,7 +98,7 @@ class _Azimuth:
         self.radius_i, self.radius_o = (dr.sqrt(w.x * w.x + w.y * w.y + 1e-14) for w in (i, o))
         cross = i.x * o.y - i.y * o.x
         self.turn = dr.select(cross < 0, -1.0, 1.0)
-        self.between = dr.atan2(dr.abs(cross), i.x * o.x + i.y * o.y + 1e-20)
+        self.between = dr.atan2(dr.abs(cross), i.x * o.x + i.y * o.y + 1e-12)  # squared in the derivative
         self.sin_between, self.cos_between = dr.sincos(self.between)
 
     def arcs(self, h):

@@ -192,9 +192,10 @@ class Micrograin(Declared):
         bs = dr.select(on_base, base, bs)
         # The grains' lobes end at the horizon, where a transmitting base may well have a density.
         value, pdf = self.eval_pdf(ctx, si, bs.wo, active & (on_base | (bs.wo.z > 0)))
-        # Mitsuba's samplers reject by a weight of zero and leave the rest as it was; a black base is not a rejection.
-        value_there = mi.unpolarized_spectrum(self.base.eval(self._base_context(ctx), si, bs.wo, on_base))
-        rejected = on_base & dr.all(mi.unpolarized_spectrum(base_weight) == 0) & dr.any(value_there > 0)
+        # Mitsuba's samplers reject by a weight of zero and leave the rest as it was. A black base is not a rejection.
+        there, there_pdf = self.base.eval_pdf(self._base_context(ctx), si, bs.wo, on_base)
+        stale = dr.any(mi.unpolarized_spectrum(there) > 0) | (dr.abs(there_pdf - bs.pdf) > 0.01 * bs.pdf)
+        rejected = on_base & dr.all(mi.unpolarized_spectrum(base_weight) == 0) & stale
         pdf = dr.select(rejected, 0, pdf)
         weight = value / dr.maximum(pdf, TINY) & (pdf > 0)
         # A mirror, clear glass, or a hole in the base: nobody else reaches its direction, and eval_pdf does not know it.
@@ -302,7 +303,7 @@ class Micrograin(Declared):
         return value, pdf / grains.visible(wi)
 
     def _weigh_multiple(self, si, active, grains, wi):
-        return dr.sum(self.table.seen(grains.tau_0, dr.normalize(wi)))
+        return sum(self.table.seen(grains.tau_0, dr.normalize(wi)))
 
     def _draw_multiple(self, si, active, grains, wi, u, sample2):
         return mi.warp.square_to_cosine_hemisphere(sample2)

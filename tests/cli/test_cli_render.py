@@ -1,0 +1,141 @@
+import json
+import signal
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from asperity.cli.passes import pass_size
+from asperity.cli.render import NEXT
+
+TINY = ("--size", "32", "--spp", "4")
+SCENE = {
+    "type": "scene",
+    "integrator": {"type": "path"},
+    "sensor": {
+        "type": "perspective",
+        "to_world": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -4], [0, 0, 0, 1]],
+        "film": {"type": "hdrfilm", "width": 24, "height": 16},
+        "sampler": {"type": "independent", "sample_count": 6},
+    },
+    "light": {"type": "constant"},
+    "ball": {"type": "sphere", "bsdf": {"type": "micrograin", "tau_0": {"type": "bitmap", "filename": "tau.exr"}}},
+}
+XML = """<scene version="3.0.0">
+  <integrator type="aov"><string name="aovs" value="distance:depth,base:albedo"/><integrator type="path"/></integrator>
+  <sensor type="perspective">
+    <transform name="to_world"><translate z="-4"/></transform>
+    <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/></film>
+  </sensor>
+  <emitter type="constant"/>
+  <shape type="sphere"><bsdf type="micrograin"><float name="tau_0" value="0.4"/><bsdf type="diffuse"/></bsdf></shape>
+</scene>"""
+
+
+def pixels(path):
+    return np.array(mi.Bitmap(str(path)))
+
+
+def files(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_the_default_writes_two_files_and_says_what_next(asperity, tmp_path):
+    result = asperity("render", *TINY)
+    assert result.exit_code == 0, result.output
+    assert files(tmp_path) == ["asperity.exr", "asperity.png"]
+    assert pixels("asperity.png").shape == (32, 32, 3) and pixels("asperity.png").dtype == np.uint8
+    assert pixels("asperity.exr").min() > 0
+    assert all(command in result.output for command in NEXT)
+
+
+@pytest.mark.parametrize("command", NEXT)
+def test_what_it_proposes_works(asperity, command):
+    arguments = command.split()[1:]
+    result = asperity(*arguments, *(TINY if arguments[0] == "render" else ()))
+    assert result.exit_code == 0, result.output
+
+
+def test_the_exr_is_linear_and_the_png_srgb(asperity):
+    asperity("render", *TINY)
+    linear = np.clip(pixels("asperity.exr"), 0, 1)
+    srgb = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    assert np.abs(255 * srgb - pixels("asperity.png")).max() <= 1
+
+
+def test_same_seed_same_picture_and_set_changes_it(asperity):
+    common = ("render", "--preset", "gilded", *TINY)
+    for name, more in {"a": (), "b": (), "seed": ("--seed", "1"), "set": ("--set", "base.alpha=0.6")}.items():
+        assert asperity(*common, *more, "-o", f"{name}.exr").exit_code == 0
+    a, b, seed, changed = (pixels(f"{name}.exr") for name in ("a", "b", "seed", "set"))
+    assert np.allclose(a, b, rtol=1e-5)  # the film sums in any order
+    assert not np.allclose(a, seed, rtol=1e-3)
+    assert not np.allclose(a, changed, rtol=1e-3)
+
+
+def test_compare_with_itself_shows_no_difference(asperity):
+    result = asperity("render", "--preset", "gilded", "--compare", "gilded", *TINY, "-o", "out.exr")
+    assert "or 0.00% of the mean" in result.output
+    left, right, difference = np.split(pixels("out.exr"), 3, axis=1)
+    assert np.allclose(left, right, rtol=1e-5) and difference.max() < 0.01  # the film sums in any order
+
+
+def test_compare_scales_the_difference_by_the_factor_it_prints(asperity):
+    result = asperity(
+        "render", "--preset", "gilded", "--compare", "gilded", "--set", "tau_0=0.19", *TINY, "-o", "o.exr"
+    )
+    factor = float(result.output.split("shown times ")[1].split(",")[0])
+    left, right, difference = np.split(pixels("o.exr"), 3, axis=1)
+    assert factor > 1
+    assert np.allclose(difference, factor * np.abs(left - right), rtol=1e-3, atol=1e-5 * factor)
+
+
+def test_material_file_and_colour(asperity, tmp_path):
+    (tmp_path / "red.json").write_text('{"type": "diffuse", "reflectance": 0.5}')
+    result = asperity("render", "--material", "red.json", "--set", "reflectance=[0.9, 0, 0]", *TINY, "-o", "out.exr")
+    assert result.exit_code == 0, result.output
+    red, green, _ = pixels("out.exr")[12:20, 14:18].mean(axis=(0, 1))
+    assert red > 2 * green
+
+
+def test_json_scene_finds_files_beside_it_and_keeps_its_size(asperity, tmp_path):
+    (tmp_path / "scenes").mkdir()
+    mi.set_variant("scalar_rgb")
+    mi.Bitmap(np.full((2, 2, 1), 0.5, np.float32)).write("scenes/tau.exr")
+    (tmp_path / "scenes" / "scene.json").write_text(json.dumps(SCENE))
+    result = asperity("render", "scenes/scene.json", "-o", "out.exr")
+    assert result.exit_code == 0, result.output
+    assert "6 samples per pixel" in result.output
+    assert pixels("out.exr").shape == (16, 24, 3)
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_spectral"])
+def test_xml_scene_with_aovs_resized(asperity, tmp_path, variant):
+    (tmp_path / "scene.xml").write_text(XML)
+    result = asperity("render", "scene.xml", "--size", "20x10", "--spp", "1", "--variant", variant, "-o", "out")
+    assert result.exit_code == 0, result.output
+    assert pixels("out.png").shape == (10, 20, 3)
+    channels = [field.name for field in mi.Bitmap("out.exr").struct_()]
+    assert pixels("out.exr").shape == (10, 20, 7)
+    assert set(channels) == {"R", "G", "B", "distance.T", "base.R", "base.G", "base.B"}
+
+
+def test_passes_are_squares_and_fit_into_memory():
+    assert [pass_size(n, 1000) for n in (100, 16, 15, 4, 3, 1)] == [16, 16, 4, 4, 1, 1]
+    assert pass_size(100, 640 * 640) == 4
+    assert pass_size(100, 8000 * 8000) == 1
+
+
+def test_ctrl_c_keeps_the_picture(asperity, tmp_path, monkeypatch):
+    render = mi.render
+
+    def interrupted(*arguments, **options):
+        signal.raise_signal(signal.SIGINT)
+        return render(*arguments, **options)
+
+    monkeypatch.setattr(mi, "render", interrupted)
+    result = asperity("render", "--size", "32", "--spp", "640", "-o", "out")
+    assert result.exit_code == 0
+    assert "stopped early: out.png and out.exr: 16 samples per pixel" in result.output
+    assert files(tmp_path) == ["out.exr", "out.png"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

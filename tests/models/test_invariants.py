@@ -1,0 +1,49 @@
+"""Every check of the lab on every model, over a spread of parameters. A new model adds its lines to SPREAD."""
+
+import asperity  # noqa: F401  isort: skip
+import pytest
+
+from asperity.lab import checks
+from asperity.models import MODELS
+
+WHITE = {"type": "diffuse", "reflectance": 0.9}
+GLASS = {"type": "roughdielectric", "alpha": 0.2, "distribution": "ggx"}
+SHEET = {"type": "mask", "opacity": 0.4, "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse"}}}
+SPREAD = {
+    "micrograin": {
+        "default": {},
+        "gold": {"material": "Au", "tau_0": 0.4, "beta": 0.5},
+        "flat": {"material": "Au", "tau_0": 0.2, "beta": 0.1, "base": WHITE},
+        "tall": {"tau_0": 0.8, "beta": 3.0},
+        "anisotropic": {"material": "Al", "tau_0": 0.62, "beta_x": 0.8, "beta_y": 1.7},
+        "height": {"masking": "height", "material": "Au", "base": WHITE},
+        "smith": {"masking": "smith", "tau_0": 0.5, "base": WHITE},
+        "diffuse": {"specular": False, "tau_0": 0.5},
+        "diffuse anisotropic": {"specular": False, "beta_x": 0.3, "base": WHITE},
+        "coated": {"int_ior": 1.5, "beta": 0.6},
+        "glass base": {"specular": False, "base": GLASS},
+        "sheet": {"base": SHEET},
+        "mirror base": {"base": {"type": "conductor", "material": "Ag"}},
+        "crossed": {"beta_x": 1.0, "beta_y": 0.2, "base": {"type": "micrograin", "beta_x": 0.2, "beta_y": 1.0}},
+        "by height": {"specular": False, "variation": "height", "diffuse_reflectance_2": 0.9},
+        "by normal": {"material": "Au", "variation": "normal", "material_2": "Ag"},
+        "multiple": {"scattering": "multiple", "tau_0": 0.5, "base": WHITE, "material": "Au"},
+        "multiple diffuse": {"scattering": "multiple", "tau_0": 0.5, "specular": False, "diffuse_reflectance": 0.9},
+    }
+}
+SLOW_TO_DIFFERENTIATE = {"coated", "diffuse anisotropic", "glass base", "multiple diffuse"}
+"""Their derivatives unroll the quadrature: half a minute of compiling each. `asperity check` has no such exception."""
+
+CASES = [(model, case) for model, cases in SPREAD.items() for case in cases]
+
+
+def test_every_model_is_here():
+    assert set(SPREAD) == set(MODELS)
+
+
+@pytest.mark.parametrize("model, case", CASES, ids=[f"{model}-{case}" for model, case in CASES])
+def test_invariants(rgb, model, case):
+    names = [name for name in checks.NAMES if not (name == "gradients" and case in SLOW_TO_DIFFERENTIATE)]
+    results = checks.check({"type": model, **SPREAD[model][case]}, only=names)
+    failed = [f"{r.name}: {r.measured} (bound: {r.bound})" for r in results if r.passed is False]
+    assert not failed, "\n".join(failed)

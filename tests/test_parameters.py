@@ -1,0 +1,89 @@
+import asperity  # noqa: F401  isort: skip
+import mitsuba as mi
+import pytest
+
+from asperity.models import MODELS
+from asperity.parameters import artist_friendly, materials
+
+
+def bitmap(low, high):
+    return {"type": "bitmap", "raw": True, "data": mi.TensorXf([low, high] * 8, (4, 4, 1))}
+
+
+BAD = {
+    "misspelt": ({"tau0": 0.3}, "no parameter 'tau0'. Did you mean 'tau_0'"),
+    "too large": ({"tau_0": 1.5}, r"tau_0 = 1.5: expected a number or texture in \[0, 1\]"),
+    "zero": ({"beta": 0.0}, r"beta = 0.0: expected a number or texture in \(0, inf\)"),
+    "NaN": ({"tau_0": float("nan")}, "tau_0 = nan"),
+    "infinite": ({"beta": float("inf")}, "beta = inf"),
+    "word for a number": ({"tau_0": "much"}, "tau_0 = 'much'"),
+    "flag for a number": ({"tau_0": True}, "tau_0 = True"),
+    "number for a flag": ({"specular": 1}, "specular = 1"),
+    "texture for a BSDF": ({"base": {"type": "checkerboard"}}, "base = .*: expected a BSDF"),
+    "texels": (lambda: {"tau_0": bitmap(0.0, 2.0)}, "tau_0 = 2 .in its 'data'.: expected"),
+    "colour": ({"diffuse_reflectance": {"type": "rgb", "value": [0.1, 1.4, 0]}}, r"diffuse_reflectance = \[0.1, 1.4, 0\]"),
+    "choice": ({"masking": "corelated"}, "masking = 'corelated'. Did you mean 'correlated'"),
+    "metal": ({"material": "Aur"}, "material = 'Aur'.*Did you mean 'Au'"),
+    "glass": ({"int_ior": "bk8"}, "int_ior = 'bk8': .*bk7"),
+    "metal twice": ({"material": "Au", "eta": 1.0}, "material and eta exclude each other"),
+    "beta twice": ({"beta": 1.0, "beta_x": 1.0}, "beta and beta_x exclude each other"),
+    "half an index": ({"eta": 1.0}, "eta is given without k"),
+    "metal and albedo": ({"material": "Au", "diffuse_reflectance": 0.3}, "material.*exclude each other"),
+    "metal without specular": ({"material": "Au", "specular": False}, "exclude each other"),
+    "no second colour": ({"variation": "height"}, "needs a second colour"),
+    "unused second colour": ({"material_2": "Au"}, "material_2: needs variation"),
+    "Smith and more": ({"masking": "smith", "scattering": "multiple"}, "masking = .smith."),
+    "textured beta": (lambda: {"beta": bitmap(0.5, 1.0), "scattering": "multiple"}, "beta: a texture"),
+}
+
+
+@pytest.mark.parametrize("given, message", BAD.values(), ids=BAD)
+def test_bad_input_is_named(rgb, given, message):
+    given = given() if callable(given) else given
+    with pytest.raises(RuntimeError, match=f"ParameterError: (.*){message}"):
+        mi.load_dict({"type": "micrograin", **given})
+
+
+def test_an_update_is_checked_but_an_optimiser_is_free(rgb):
+    params = mi.traverse(mi.load_dict({"type": "micrograin"}))
+    params["tau_0.value"] = 1.5
+    with pytest.raises(ValueError, match="tau_0 = 1.5"):
+        params.update()
+    import drjit as dr
+
+    value = mi.Float(1.5)
+    dr.enable_grad(value)
+    params["tau_0.value"] = value
+    params.update()
+
+
+def test_eight_bit_textures_are_in_range(rgb):
+    data = mi.Bitmap(mi.TensorXf([0.0, 1.0] * 8, (4, 4, 1))).convert(component_format=mi.Struct.Type.UInt8)
+    mi.load_dict({"type": "micrograin", "tau_0": {"type": "bitmap", "bitmap": data, "raw": True}})
+
+
+def test_every_model_documents_every_parameter():
+    for model in MODELS.values():
+        rows = model.rows()
+        assert len({row.name for row in rows}) == len(rows)
+        assert all(row.meaning and row.kind for row in rows)
+        assert model.__doc__ and model.citation.startswith("@")
+
+
+def test_materials_are_mitsubas():
+    assert {"none", "Au", "Cu", "Al"} <= set(materials())
+
+
+def test_metal_by_name_equals_roughconductor(rgb):
+    ours = mi.traverse(mi.load_dict({"type": "micrograin", "material": "Au"}))
+    theirs = mi.traverse(mi.load_dict({"type": "roughconductor", "material": "Au"}))
+    for name in ("eta.value", "k.value"):
+        assert str(ours[name]) == str(theirs[name])
+
+
+@pytest.mark.parametrize("reflectivity", [0.02, 0.5, 0.95])
+@pytest.mark.parametrize("edge_tint", [0.0, 0.4, 1.0])
+def test_artist_friendly_metal_reflects_what_was_asked(rgb, reflectivity, edge_tint):
+    eta, k = artist_friendly(mi.Float(reflectivity), mi.Float(edge_tint))
+    at_normal = mi.fresnel_conductor(mi.Float(1), mi.Complex2f(eta, k))
+    assert at_normal[0] == pytest.approx(reflectivity, abs=2e-5)  # float32: eta and k reach 40 at the edges
