@@ -21,6 +21,7 @@ BAD = {
     "number for a flag": ({"specular": 1}, "specular = 1"),
     "texture for a BSDF": ({"base": {"type": "checkerboard"}}, "base = .*: expected a BSDF"),
     "texels": (lambda: {"tau_0": bitmap(0.0, 2.0)}, "tau_0 = 2 .in its 'data'.: expected"),
+    "our texture": ({"tau_0": {"type": "settled", "top": 2.0}}, "tau_0 = 2 "),
     "colour": ({"diffuse_reflectance": {"type": "rgb", "value": [0.1, 1.4, 0]}}, r"diffuse_reflectance = \[0.1, 1.4, 0\]"),
     "choice": ({"masking": "corelated"}, "masking = 'corelated'. Did you mean 'correlated'"),
     "metal": ({"material": "Aur"}, "material = 'Aur'.*Did you mean 'Au'"),
@@ -55,6 +56,10 @@ def test_an_update_is_checked_but_an_optimiser_is_free(rgb):
     dr.enable_grad(value)
     params["tau_0.value"] = value
     params.update()
+
+
+def test_a_nested_texture_has_its_own_ranges(rgb):
+    mi.load_dict({"type": "micrograin", "tau_0": {"type": "settled", "threshold": -0.3, "softness": 1.5}})
 
 
 def test_eight_bit_textures_are_in_range(rgb):

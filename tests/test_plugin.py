@@ -1,5 +1,7 @@
+import gc
 import subprocess
 import sys
+import weakref
 from importlib.metadata import entry_points
 
 import asperity  # noqa: F401  isort: skip
@@ -134,6 +136,17 @@ def test_gradients_reach_a_scene_parameter(rgb):
     params.update()
     dr.backward(dr.mean(mi.render(scene, params, spp=64), axis=None))
     assert dr.isfinite(dr.grad(params[key]))[0] and dr.grad(params[key])[0] != 0
+
+
+def test_models_die_at_once(rgb):
+    """Without waiting for the cyclic collector, which may strike while Mitsuba traces a call to all BSDFs."""
+    model = mi.load_dict({**DUSTY, "tau_0": {"type": "settled"}}).model
+    watched = [weakref.ref(model), weakref.ref(model.tau_0.model)]
+    gc.disable()
+    del model
+    alive = [reference() for reference in watched]
+    gc.enable()
+    assert alive == [None, None]
 
 
 def test_memory_stays_flat_over_updates(rgb):

@@ -340,10 +340,12 @@ class Declared:
     """What reads the declarations of a class; the base of every model.
 
     A model may define ``configure(given)`` to settle parameters that depend on each other; ``given`` holds the names
-    that the scene gave. ``constant`` names those that cannot be differentiated.
+    that the scene gave. ``constant`` names those that cannot be differentiated;
+    ``between``, for a texture, those that its values lie between.
     """
 
     constant: Set[str] = frozenset()
+    between: tuple[str, ...] = ()
 
     @classmethod
     def declarations(cls) -> list[Parameter]:
@@ -406,6 +408,10 @@ def _objects(parent: Any) -> dict[str, Any]:
 
 def _numbers(texture: Any) -> Iterable[tuple[str, np.ndarray]]:
     """The constants and texels of a texture; not those that are being differentiated: they are the optimiser's."""
+    if isinstance(ours := getattr(texture, "model", None), Declared):
+        for name in ours.between:
+            yield from _numbers(getattr(ours, name))
+        return
     for key, data in mi.traverse(texture).items() if isinstance(texture, mi.Texture) else ():
         if key.rsplit(".", 1)[-1] not in ("value", "values", "data") or dr.grad_enabled(data):
             continue

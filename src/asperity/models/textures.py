@@ -16,7 +16,9 @@ class Settled(Declared):
     Between them, a smooth step of the normal's vertical component around ``threshold`` (Lucas 2024, Fig. 1b).
     """
 
-    top = Texture("value on upward surfaces", 0.6, unit="")
+    between = ("top", "bottom")
+
+    top = Texture("value on upward surfaces", 0.6)
     bottom = Texture("value on downward surfaces", 0.0, unit="")
     threshold = Texture("vertical component of the normal half way between them", 0.3, low=-1, high=1)
     softness = Texture("half the width of the step, in the same component", 0.6, open_low=True, high=4)

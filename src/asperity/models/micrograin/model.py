@@ -61,7 +61,11 @@ class Grains(NamedTuple):
 
 
 class Lobe(NamedTuple):
-    """One of the grains' own lobes; the arguments of its functions begin with (si, active, grains, wi)."""
+    """One of the grains' own lobes; the arguments of its functions begin with (model, si, active, grains, wi).
+
+    Functions, not bound methods: a model must not refer to itself. Python's collector would free it at any moment, and
+    Mitsuba crashes if that is while it traces a call to all BSDFs there are.
+    """
 
     flags: int
     weigh: Callable  # () -> share of the incident light, by which `sample` chooses
@@ -136,13 +140,14 @@ class Micrograin(Declared):
         """Flags of the grains' lobes and then of the base's."""
         front = mi.BSDFFlags.FrontSide | (0 if self.isotropic else mi.BSDFFlags.Anisotropic)
         glossy, diffuse = (int(flag | front) for flag in (mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.DiffuseReflection))
+        cls = type(self)
         self.lobes = []
         if self.specular:
-            self.lobes += [Lobe(glossy, self._weigh_specular, self._specular, self._draw_specular)]
+            self.lobes += [Lobe(glossy, cls._weigh_specular, cls._specular, cls._draw_specular)]
         if self.diffuse:
-            self.lobes += [Lobe(diffuse, self._weigh_diffuse, self._diffuse, self._draw_diffuse)]
+            self.lobes += [Lobe(diffuse, cls._weigh_diffuse, cls._diffuse, cls._draw_diffuse)]
         if self.scattering == "multiple":
-            self.lobes += [Lobe(diffuse, self._weigh_multiple, self._multiple, self._draw_multiple)]
+            self.lobes += [Lobe(diffuse, cls._weigh_multiple, cls._multiple, cls._draw_multiple)]
         base = [] if self.base is None else [self.base.flags(n) for n in range(self.base.component_count())]
         return [lobe.flags for lobe in self.lobes] + base
 
@@ -160,7 +165,7 @@ class Micrograin(Declared):
         wi, lifted = grains.lift(si.wi), grains.lift(wo)
         value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
         for n, chance in chances.items():
-            lobe_value, lobe_pdf = self.lobes[n].evaluate(si, active, grains, wi, lifted)
+            lobe_value, lobe_pdf = self.lobes[n].evaluate(self, si, active, grains, wi, lifted)
             value, pdf = value + lobe_value, pdf + chance * lobe_pdf
         value, pdf = dr.select(above, value * (wo.z / lifted.z), 0), dr.select(above, pdf, 0)
         if base_chance is not None:
@@ -176,7 +181,7 @@ class Micrograin(Declared):
         bs.eta = 1
         for n, chance in chances.items():
             chosen = sample1 >= start
-            wo = self.lobes[n].draw(si, active, grains, wi, _rescale(sample1, start, chance), sample2)
+            wo = self.lobes[n].draw(self, si, active, grains, wi, _rescale(sample1, start, chance), sample2)
             bs.wo = dr.select(chosen, wo, bs.wo)
             bs.sampled_component = dr.select(chosen, mi.UInt32(n), bs.sampled_component)
             bs.sampled_type = dr.select(chosen, mi.UInt32(self.lobes[n].flags), bs.sampled_type)
@@ -210,7 +215,7 @@ class Micrograin(Declared):
         grains = Grains(tau_0, density(tau_0), *(beta.eval_1(si, active) for beta in self.betas))
         wi, above = grains.lift(si.wi), si.wi.z > 0
         shares = {
-            n: dr.select(above, lobe.weigh(si, active, grains, wi), 0)
+            n: dr.select(above, lobe.weigh(self, si, active, grains, wi), 0)
             for n, lobe in enumerate(self.lobes)
             if ctx.is_enabled(mi.BSDFFlags(lobe.flags & int(mi.BSDFFlags.Smooth)), n)
         }
