@@ -63,6 +63,11 @@ def scenes(size: int, spp: int) -> dict:
     }
 
 
+def finish(result) -> None:
+    dr.eval(result)
+    dr.sync_thread()
+
+
 def medians(tasks: dict, rounds: int) -> dict[str, float]:
     """Median seconds of each task, the tasks taking turns so that all meet the same noise."""
     seconds = {name: [] for name in tasks}
@@ -79,7 +84,7 @@ def medians(tasks: dict, rounds: int) -> dict[str, float]:
 def frames(make, rounds: int) -> dict[str, float]:
     def task(material):
         scene, seed = mi.load_dict(make(material), parallel=False), iter(range(1 << 20))
-        return lambda: dr.eval(mi.render(scene, seed=next(seed))) or dr.sync_thread()
+        return lambda: finish(mi.render(scene, seed=next(seed)))
 
     return medians({name: task(material) for name, material in MATERIALS.items()}, rounds)
 
@@ -96,8 +101,8 @@ def calls(method: str, rounds: int) -> dict[str, float]:
     def task(material):
         bsdf, ctx = mi.load_dict(material), mi.BSDFContext()
         if method == "eval_pdf":
-            return lambda: dr.eval(bsdf.eval_pdf(ctx, si, wo)) or dr.sync_thread()
-        return lambda: dr.eval(bsdf.sample(ctx, si, u, mi.Point2f(wo.x * 0.5 + 0.5, wo.y * 0.5 + 0.5))) or dr.sync_thread()
+            return lambda: finish(bsdf.eval_pdf(ctx, si, wo))
+        return lambda: finish(bsdf.sample(ctx, si, u, mi.Point2f(wo.x * 0.5 + 0.5, wo.y * 0.5 + 0.5)))
 
     tasks = {name: task(material) for name, material in MATERIALS.items()}
     return {name: seconds / LANES * 1e9 for name, seconds in medians(tasks, rounds).items()}
@@ -110,7 +115,7 @@ def updates(count: int) -> tuple[int, int]:
         with open("/proc/self/statm") as file:
             return int(file.read().split()[1]) * 4096 >> 20
 
-    scene = mi.load_dict(preview(MATERIALS["micrograin on a diffuse base"], size=(32, 32), spp=4), parallel=False)
+    scene = mi.load_dict(preview({"type": "micrograin", **GRAINS, "base": {"type": "diffuse"}}, size=(32, 32), spp=4), parallel=False)
     params, early = mi.traverse(scene), 0
     for step in range(count):
         params["object.bsdf.tau_0.value"] = 0.1 + 0.8 * step / count
@@ -132,7 +137,7 @@ def main() -> None:
     if only:
         for name in [name for name in MATERIALS if name != REFERENCE and only not in name]:
             del MATERIALS[name]
-    size, spp, rounds = (128, 16, 5) if quick else (384, 32, 15)
+    size, spp, rounds = (128, 16, 5) if quick else (256, 32, 11)
     columns = {name: frames(make, rounds) for name, make in scenes(size, spp).items()}
     columns |= {f"{method}, ns": calls(method, rounds) for method in ("eval_pdf", "sample")}
     table = Table("", *columns, title="ratio to roughconductor (and time)")

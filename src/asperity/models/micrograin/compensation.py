@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from .grains import density, sample_visible_normal, visible_fraction
-from .shadows import lift, shadow, to_sphere, union
+from .shadows import Shadows, lift, shadow, to_sphere
 
 FILLINGS, COSINES, AZIMUTHS = 25, 32, 7
 """Nodes of the tables: in arcsin(sqrt(tau_0)), in the root of the cosine, and in the azimuth of the first quadrant."""
@@ -110,8 +110,7 @@ def _losses(tau_0, cos, azimuth, beta_x, beta_y, diffuse):
 
     def blocked(wo, h):  # of what is seen along i at height h, the share that is in shadow along wo
         o = to_sphere(lift(wo, beta_x, beta_y), beta_x, beta_y)
-        shadow_i, shadow_o = shadow(i, h), shadow(o, h)
-        return 1 - dr.select(wo.z > 0, dr.exp(-r * (union(i, o, h, shadow_i, shadow_o) - shadow_i.area)), 0)
+        return 1 - dr.select(wo.z > 0, dr.exp(-r * (Shadows(i, o).union(h) - shadow(i, h))), 0)
 
     visible = visible_fraction(r, i)
     columns = visible * blocked(wo, h), (1 - visible) * blocked(cosine, Float(0)), visible

@@ -18,7 +18,7 @@ import drjit as dr
 
 from ...microfacet.quadrature import gauss_legendre, integrate
 from .grains import exposure
-from .shadows import shadow, to_sphere
+from .shadows import Shadows, shadow, to_sphere
 
 HEIGHTS, AZIMUTHS = 16, 8
 """Nodes. Against 300 nodes, over 20 000 random parameters and directions (cosines >= 0.03, a third near retro), the
@@ -40,7 +40,7 @@ def lambertian(
     beta_y,
     wi,
     wo,
-    shaded: Callable,
+    shaded: Callable[[Shadows, Any], Any],
     *,
     closed: bool,
     share: Callable | None = None,
@@ -52,26 +52,25 @@ def lambertian(
 
     Parameters
     ----------
-    shaded(i, o, h, shadow_i, shadow_o) : area of the shadows at height h, by the choice of masking
+    shaded(shadows, h) : area of the shadows at height h, by the choice of masking
     closed : the azimuth has a closed form; needs beta_x = beta_y, no coat, and a share that varies with height only
     share(h, m) : of the second albedo at height h and normal m (None if closed), in [0, 1]
     transmittance(cos_i, cos_o) : of a grain's dielectric coat, for local cosines
     """
     i, o = to_sphere(wi, beta_x, beta_y), to_sphere(wo, beta_x, beta_y)
     stretch_o = dr.sqrt(dr.square(beta_x * wo.x) + dr.square(beta_y * wo.y) + dr.square(wo.z))  # |E o|
-    azimuth = _Azimuth(i, o)
+    azimuth, shadows = _Azimuth(i, o), Shadows(i, o)
 
     def at_height(t):
         h, jacobian = 1 - (1 - t) ** 3, 3 * (1 - t) ** 2  # crowded at the top, which alone is seen at grazing
-        shadow_i, shadow_o = shadow(i, h), shadow(o, h)
         if closed:
             lit = azimuth.product(h) * dr.rsqrt(dr.square(beta_x) * (1 - h * h) + h * h)
             second = share(h, None) * lit if share else 0 * lit
             value = lit
         else:
             value, second, lit = at_azimuths(h)
-        exposed = jacobian * exposure(r, h, shaded(i, o, h, shadow_i, shadow_o))
-        visible = jacobian * exposure(r, h, shadow_i.area)
+        exposed = jacobian * exposure(r, h, shaded(shadows, h))
+        visible = jacobian * exposure(r, h, shadow(i, h))
         return exposed * (value - second), exposed * second, visible * lit
 
     def at_azimuths(h):

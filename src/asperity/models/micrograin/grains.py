@@ -53,50 +53,64 @@ def sample_visible_normal(r, w, u, v):
     """
     sin, cos = inclination(w)
     h = _visible_height(r, sin, cos, u)
-    azimuth, radius = _visible_azimuth(sin, cos, h, v), dr.safe_sqrt((1 - h) * (1 + h))
-    sin_azimuth, cos_azimuth = dr.sincos(azimuth)
-    x, y = w.x / sin, w.y / sin
-    toward = dr.select(sin > 1e-6, x * cos_azimuth - y * sin_azimuth, cos_azimuth)
-    aside = dr.select(sin > 1e-6, y * cos_azimuth + x * sin_azimuth, sin_azimuth)
-    return type(w)(radius * toward, radius * aside, h)
+    radius = dr.safe_sqrt((1 - h) * (1 + h))
+    sin_azimuth, cos_azimuth = _visible_azimuth(sin, cos, h, radius, v)
+    x, y = dr.select(sin > 1e-6, w.x / sin, 1), w.y / sin
+    return type(w)(radius * (x * cos_azimuth - y * sin_azimuth), radius * (y * cos_azimuth + x * sin_azimuth), h)
 
 
 def _visible_height(r, sin, cos, u):
     """Invert 1 - exp(-r sigma_full(h)) = u tau_i for the height h in [0, 1]."""
     whole = dr.pi / 2 * (1 + 1 / cos)  # sigma_full at h = 0
-    shaded = -log1p(-u * one_minus_exp(r * whole)) / dr.maximum(r, 1e-12)
-    # Above h = sin the shadow is the disc itself; below, the silhouette's angle alpha is the unknown, h = sin cos(alpha).
+    visible_above = -log1p(-u * one_minus_exp(r * whole)) / dr.maximum(r, 1e-12)
+    # Above h = sin there is no shadow; below, the unknown is the silhouette's angle: h = sin cos(alpha).
     top = dr.pi * cos * cos
-    q = dr.clip((shaded - top) / dr.maximum(whole - top, 1e-12), 0, 1)
+    q = dr.clip((visible_above - top) / dr.maximum(whole - top, 1e-12), 0, 1)
     alpha = dr.pi / 2 * (cos * dr.sqrt(q) + (1 - cos) * dr.power(q + 1e-20, 1 / 3))
+    sin_alpha, cos_alpha = dr.sincos(alpha)
     for _ in range(2):
-        sin_alpha, cos_alpha = dr.sincos(alpha)
         h = sin * cos_alpha
         gamma = dr.atan2(sin_alpha, cos * cos_alpha + 1e-20)
-        f = (dr.pi - gamma) * (1 - h * h) + (alpha - h * sin * sin_alpha) / cos - shaded
-        width = 2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha)  # M, with sigma_full' = -M / cos
-        gamma_slope = cos / (dr.square(sin_alpha) + dr.square(cos * cos_alpha) + 1e-20)
+        f = (dr.pi - gamma) * (1 - h * h) + (alpha - h * sin * sin_alpha) / cos - visible_above
+        width = 2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha)  # M = -cos sigma_full'(h)
+        gamma_slope = cos / (sin_alpha * sin_alpha + cos * cos * cos_alpha * cos_alpha + 1e-20)
         width_slope = 2 * (sin * cos_alpha - cos * sin * sin_alpha * (dr.pi - gamma) - cos * h * gamma_slope)
-        slope = width / cos * sin * sin_alpha
-        bend = sin / cos * (width_slope * sin_alpha + width * cos_alpha)
-        step = 2 * f * slope / dr.maximum(2 * slope * slope - f * bend, 1e-20)
-        alpha = dr.clip(alpha - step, 0, dr.pi / 2)
-    return dr.select(shaded <= top, dr.safe_sqrt(1 - shaded / dr.pi), sin * dr.cos(alpha))
+        slope, bend = sin / cos * width * sin_alpha, sin / cos * (width_slope * sin_alpha + width * cos_alpha)
+        turned = dr.clip(alpha + _halley(f, slope, bend), 0, dr.pi / 2)
+        sin_alpha, cos_alpha = _turn(sin_alpha, cos_alpha, turned - alpha)
+        alpha = turned
+    return dr.select(visible_above <= top, dr.safe_sqrt(1 - visible_above / dr.pi), sin * dr.maximum(cos_alpha, 0))
 
 
-def _visible_azimuth(sin, cos, h, v):
-    """Azimuth about ``w`` with density proportional to (a + b cos x)+, a = cos h, b = sin sqrt(1 - h^2)."""
-    a, b = cos * h, sin * dr.safe_sqrt((1 - h) * (1 + h))
-    _, sin_alpha, gamma = silhouette(sin, cos, dr.minimum(h / sin, 1))
+def _visible_azimuth(sin, cos, h, radius, v):
+    """Sine and cosine of an azimuth x about ``w`` with density proportional to (a + b cos x)+."""
+    a, b = cos * h, sin * radius
+    _, sin_alpha, gamma = silhouette(sin, cos, h)
     limit = dr.pi - gamma
     side, v = dr.select(v < 0.5, -1.0, 1.0), dr.abs(2 * v - 1)
     target = v * (a * limit + sin * sin_alpha)
     # Where a < b the density vanishes linearly at the limit, so the distribution ends in a square root.
     x = limit * (1 - dr.sqrt(1 - v))
+    sin_x, cos_x = dr.sincos(x)
     for _ in range(2):
-        sin_x, cos_x = dr.sincos(x)
         f = a * x + b * sin_x - target
-        slope, bend = dr.maximum(a + b * cos_x, 0), -b * sin_x
-        step = 2 * f * slope / dr.maximum(2 * slope * slope - f * bend, 1e-20)
-        x = dr.clip(x - step, 0, limit)
-    return side * x
+        turned = dr.clip(x + _halley(f, dr.maximum(a + b * cos_x, 0), -b * sin_x), 0, limit)
+        sin_x, cos_x = _turn(sin_x, cos_x, turned - x)
+        x = turned
+    return side * sin_x, cos_x
+
+
+def _halley(f, slope, bend):
+    """Halley's step to the root of a function of this value and these first two derivatives."""
+    return -2 * f * slope / dr.maximum(2 * slope * slope - f * bend, 1e-20)
+
+
+def _turn(sin, cos, angle):
+    """Sine and cosine of an angle advanced by less than a radian: Taylor series, good to 1e-5, and normalised.
+
+    A Halley step that long is the first of two; its error is forgiven by the next.
+    """
+    square = angle * angle
+    s = angle * (1 - square / 6 * (1 - square / 20 * (1 - square / 42)))
+    c = 1 - square / 2 * (1 - square / 12 * (1 - square / 30))
+    return sin * c + cos * s, cos * c - sin * s

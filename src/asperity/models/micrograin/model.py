@@ -18,7 +18,7 @@ from . import smith
 from .compensation import LossTable, lobe
 from .diffuse import lambertian
 from .grains import density, exposure, normal_in_sphere_space, sample_visible_normal, visible_fraction
-from .shadows import lift, shadow, to_sphere, union
+from .shadows import Shadows, lift, shadow, to_sphere
 
 CITATION = """\
 @article{Lucas2024Micrograin,
@@ -219,6 +219,8 @@ class Micrograin(Declared):
             for n, lobe in enumerate(self.lobes)
             if ctx.is_enabled(mi.BSDFFlags(lobe.flags & int(mi.BSDFFlags.Smooth)), n)
         }
+        if self.base is None and len(shares) == 1:
+            return grains, dict.fromkeys(shares, 1), None
         # Exact visibility: Lucas 2024, Eq. 26 gives the pores too much.
         base = None if self._base_context(ctx) is None else dr.select(above, 1 - grains.visible(wi), 1)
         scale = dr.rcp(dr.maximum(sum(shares.values()) + (0 if base is None else base), TINY))
@@ -237,19 +239,16 @@ class Micrograin(Declared):
         Below the surface nothing casts shadows, but light meets the base through pores only, from either side.
         """
         i, o = (grains.to_sphere(grains.lift(w)) for w in (wi, wo))
-        shadow_i, shadow_o = shadow(i, 0), shadow(o, 0)
         if self.masking == "smith":
             both = smith.pore_weight(grains.r, i, o)
         else:
-            both = exposure(grains.r, 0, self._shaded(i, o, 0, shadow_i, shadow_o))
-        one = exposure(grains.r, 0, dr.select(wi.z > 0, shadow_i.area, 0) + dr.select(wo.z > 0, shadow_o.area, 0))
+            both = exposure(grains.r, 0, self._shaded(Shadows(i, o), 0))
+        one = exposure(grains.r, 0, dr.select(wi.z > 0, shadow(i, 0), 0) + dr.select(wo.z > 0, shadow(o, 0), 0))
         return dr.select((wi.z > 0) & (wo.z > 0), both, one)
 
-    def _shaded(self, i, o, h, shadow_i, shadow_o):
-        """Area of the two shadows by the choice of masking: Lucas 2024, Eq. 17 or 18."""
-        if self.masking == "correlated":
-            return union(i, o, h, shadow_i, shadow_o)
-        return shadow_i.area + shadow_o.area
+    def _shaded(self, shadows: Shadows, h):
+        """Area in shadow at height ``h`` by the choice of masking: Lucas 2024, Eq. 17 or 18."""
+        return shadows.union(h) if self.masking == "correlated" else shadows.sum(h)
 
     def _weigh_specular(self, si, active, grains, wi):
         return grains.visible(wi) * (1 - self._diffuse_part(si, active, wi))
@@ -267,9 +266,8 @@ class Micrograin(Declared):
         if self.masking == "smith":
             value = reflected * exposure(grains.r, h, 0) * smith.masking_shadowing(grains.r, i, o)
             return fresnel * value, d_ggx * smith.visible_masking(i) / (4 * wi.z)
-        shadow_i, shadow_o = shadow(i, h), shadow(o, h)
-        value = reflected * exposure(grains.r, h, self._shaded(i, o, h, shadow_i, shadow_o))
-        return fresnel * value, reflected * exposure(grains.r, h, shadow_i.area) / grains.visible(wi)
+        value = reflected * exposure(grains.r, h, self._shaded(Shadows(i, o), h))
+        return fresnel * value, reflected * exposure(grains.r, h, shadow(i, h)) / grains.visible(wi)
 
     def _weigh_diffuse(self, si, active, grains, wi):
         return grains.visible(wi) * self._diffuse_part(si, active, wi)

@@ -8,25 +8,10 @@ Arguments are Dr.Jit arrays of any precision, or plain floats; directions have `
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import drjit as dr
-
-from ...microfacet.numerics import arccos
 
 GRAZING = 1e-3
 """Smallest cosine in sphere space: shadows grow as its inverse, beyond what float32 resolves."""
-
-
-class Shadow(NamedTuple):
-    """The shadow that one grain casts along one direction onto the plane at height h."""
-
-    sin: Any  # of the direction's inclination, in sphere space
-    cos: Any
-    alpha: Any  # half of the angle around the shadow's cylinder that is lit, 0 where there is no shadow
-    sin_alpha: Any
-    gamma: Any  # azimuth of the silhouette point, seen from the centre of the disc at height h
-    area: Any
 
 
 def to_sphere(w, beta_x, beta_y):
@@ -46,54 +31,80 @@ def inclination(w):
     return dr.sqrt(w.x * w.x + w.y * w.y + 1e-14), dr.maximum(w.z, GRAZING / 2)
 
 
-def silhouette(sin, cos, cos_alpha):
-    """(alpha, sin alpha, gamma) of the silhouette point whose cylinder angle has cosine ``cos_alpha`` = h / sin."""
-    sin_alpha = dr.safe_sqrt((1 - cos_alpha) * (1 + cos_alpha))
-    alpha = dr.atan2(sin_alpha, cos_alpha + 1e-20)
-    gamma = dr.atan2(sin_alpha, cos * cos_alpha + 1e-20)
-    return alpha, sin_alpha, gamma
+def silhouette(sin, cos, h):
+    """(cos alpha, sin alpha, gamma) of the silhouette point of a shadow on the plane at height ``h``.
 
-
-def shadow(w, h) -> Shadow:
-    """Shadow along ``w`` on the plane at height ``h``, area sigma_s (Lucas 2024, Appendix A)."""
-    sin, cos = inclination(w)
-    cos_alpha = dr.minimum(h / sin, 1)
-    alpha, sin_alpha, gamma = silhouette(sin, cos, cos_alpha)
-    area = (alpha - h * sin * sin_alpha) / cos - (1 - h * h) * gamma
-    return Shadow(sin, cos, alpha, sin_alpha, gamma, dr.maximum(area, 0))
-
-
-def overlap(i, o, h, shadow_i: Shadow, shadow_o: Shadow):
-    """Area that the shadows along ``i`` and ``o`` share, sigma_cap (Lucas 2024, Appendix B).
-
-    Where the shadow ellipses cross, p.(i - o) = 0, which is linear in the cosine and sine of the angle psi around each
-    shadow's cylinder; clipping psi at the silhouettes yields the paper's three cases.
+    alpha is half the angle around the shadow's cylinder that is in light, cos alpha = h / sin; 0 if there is no shadow.
+    gamma is the azimuth of that point about the centre of the disc that the grain cuts from the plane.
     """
-    d = i - o
-    level = dr.squared_norm(d) / 2 * h
-    cross = dr.abs(i.x * d.y - i.y * d.x)
-    along_i, along_o = i.x * d.x + i.y * d.y, -(o.x * d.x + o.y * d.y)
-
-    across_i, along_i = shadow_i.cos * cross / shadow_i.sin, along_i / shadow_i.sin
-    across_o, along_o = shadow_o.cos * cross / shadow_o.sin, along_o / shadow_o.sin
-    norm = dr.maximum(dr.sqrt(across_i * across_i + along_i * along_i + 1e-30), 1e-12)
-    crossing = arccos(dr.minimum(level / norm, 1))
-
-    cap = _beyond_crossing(shadow_i, h, crossing - dr.atan2(across_i + 1e-12, along_i))
-    cap += _beyond_crossing(shadow_o, h, crossing - dr.atan2(across_o + 1e-12, along_o))
-    # In exact arithmetic the minimum changes nothing; it matters when i and o differ by a few ulp in z alone.
-    return dr.minimum(cap, dr.minimum(shadow_i.area, shadow_o.area))
+    cos_alpha = dr.minimum(h / sin, 1)
+    sin_alpha = dr.safe_sqrt((1 - cos_alpha) * (1 + cos_alpha))
+    return cos_alpha, sin_alpha, dr.atan2(sin_alpha, cos * cos_alpha + 1e-20)
 
 
-def _beyond_crossing(shadow: Shadow, h, psi):
-    """Part of a shadow between the angle ``psi`` and the silhouette nearer to the other shadow."""
-    psi = dr.clip(psi, -shadow.alpha, shadow.alpha)
-    sin_psi, cos_psi = dr.sincos(psi)
-    eta = dr.atan2(shadow.cos * sin_psi, dr.maximum(cos_psi - h * shadow.sin, 0) + 1e-20)
-    segment = (shadow.alpha - psi - h * shadow.sin * (shadow.sin_alpha - sin_psi)) / shadow.cos
-    return dr.clip((segment - (1 - h * h) * (shadow.gamma - eta)) / 2, 0, shadow.area)
+def shadow(w, h):
+    """Area sigma_s of the shadow along ``w`` on the plane at height ``h`` (Lucas 2024, Appendix A)."""
+    sin, cos = inclination(w)
+    cos_alpha, sin_alpha, gamma = silhouette(sin, cos, h)
+    alpha = dr.atan2(sin_alpha, cos_alpha + 1e-20)
+    return dr.maximum((alpha - h * sin * sin_alpha) / cos - (1 - h * h) * gamma, 0)
 
 
-def union(i, o, h, shadow_i: Shadow, shadow_o: Shadow):
-    """Area shaded along ``i`` or ``o``: the distant term is exp(-r union) (Lucas 2024, Eq. 18 and 19)."""
-    return shadow_i.area + shadow_o.area - overlap(i, o, h, shadow_i, shadow_o)
+class Shadows:
+    """The two shadows along ``i`` and ``o``, which may overlap (Lucas 2024, Appendix B).
+
+    Where their outlines cross, p.(i - o) = 0. In the angle psi around one shadow's cylinder, counted from its deepest
+    point towards the other shadow, that is linear: B cos(psi) - A sin(psi) = (1 - i.o) h. Clipping psi at the silhouette
+    points, +-alpha, yields the paper's three cases without telling them apart.
+    """
+
+    def __init__(self, i, o):
+        self.i, self.o = i, o
+        x, y = i.x - o.x, i.y - o.y  # differences first: i.o and cross products lose all digits near retro-reflection
+        # i.z - o.z of unit vectors, from the other two: were it rounded on its own, i and o that differ in z alone, by a
+        # few ulp, would seem to cast shadows apart.
+        z = -(x * (i.x + o.x) + y * (i.y + o.y)) / (i.z + o.z)
+        one_minus_cos = (x * x + y * y + z * z) / 2
+        cross = dr.abs(i.x * y - i.y * x)
+        self.sides = [
+            self._side(w, cross, along, one_minus_cos) for w, along in ((i, i.x * x + i.y * y), (o, -(o.x * x + o.y * y)))
+        ]
+
+    @staticmethod
+    def _side(w, cross, along, one_minus_cos):
+        """What does not depend on the height: inclination, (1 - i.o) / |(A, B)|, and the angle of (A, B)."""
+        sin, cos = inclination(w)
+        a, b = cos * cross + 1e-12, along  # times sin
+        scale = dr.rsqrt(a * a + b * b)
+        return sin, cos, one_minus_cos * sin * scale, a * scale, b * scale
+
+    def union(self, h):
+        """Area shaded along ``i`` or ``o`` on the plane at height ``h``: sigma_i + sigma_o - sigma_cap (Eq. 18)."""
+        return dr.maximum(sum(self._half(h, *side) for side in self.sides), 0)
+
+    def sum(self, h):
+        """Area of both shadows, their overlap counted twice: sigma_i + sigma_o (Eq. 17)."""
+        return shadow(self.i, h) + shadow(self.o, h)
+
+    @staticmethod
+    def _half(h, sin, cos, level, sin_axis, cos_axis):
+        """A shadow less its half of the overlap, which ends at psi = crossing - axis.
+
+        sigma - [alpha - psi - h sin (sin alpha - sin psi)] / (2 cos) + (1 - h^2) (gamma - eta) / 2: the angles come in the
+        sums alpha + psi and gamma + eta, each a single arc tangent. eta is psi as seen from the centre of the disc.
+        """
+        cos_alpha, cos_crossing = dr.minimum(h / sin, 1), dr.minimum(level * h, 1)
+        sin_alpha, sin_crossing = (dr.safe_sqrt((1 - x) * (1 + x)) for x in (cos_alpha, cos_crossing))
+        sin_psi = sin_crossing * cos_axis - cos_crossing * sin_axis
+        cos_psi = cos_crossing * cos_axis + sin_crossing * sin_axis
+        beyond = (cos_psi < 0) | (dr.abs(sin_psi) > sin_alpha)  # sines tell small angles apart, cosines do not
+        sin_psi = dr.select(beyond, dr.copysign(sin_alpha, sin_psi), sin_psi)
+        cos_psi = dr.select(beyond, cos_alpha, cos_psi)
+        angle = _angle_of_product(cos_alpha, sin_alpha, cos_psi, sin_psi)
+        centre = _angle_of_product(cos * cos_alpha, sin_alpha, cos_psi - h * sin, cos * sin_psi)
+        return ((angle - h * sin * (sin_alpha + sin_psi)) / cos - (1 - h * h) * centre) / 2
+
+
+def _angle_of_product(x, y, u, v):
+    """Sum of the polar angles of (x, y) and (u, v), if that is in [0, pi]."""
+    return dr.atan2(dr.maximum(x * v + y * u, 0), x * u - y * v + 1e-20)

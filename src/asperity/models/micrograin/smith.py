@@ -23,7 +23,7 @@ def masking(r, w):
     sin, cos = inclination(w)
 
     def width(h):  # int (w.m')+ over the azimuth, of what is exposed at height h
-        _, sin_alpha, gamma = silhouette(sin, cos, dr.minimum(h / sin, 1))
+        _, sin_alpha, gamma = silhouette(sin, cos, h)
         return (2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha) * exposure(r, h, 0),)
 
     (projected,) = integrate(width, HEIGHTS, r * cos)
