@@ -48,7 +48,6 @@ class GGX(SampledOtherwise):
         return d_ggx * smith.visible_masking(grains.to_sphere(wi)) * dr.dot(wi, m) / wi.z
 
 
-
 def register() -> None:
     """Make ``micrograin_ndf`` and ``micrograin_ggx`` known in the active variant."""
     models.MODELS |= {"micrograin_ndf": NDF, "micrograin_ggx": GGX}

@@ -115,7 +115,9 @@ def updates(count: int) -> tuple[int, int]:
         with open("/proc/self/statm") as file:
             return int(file.read().split()[1]) * 4096 >> 20
 
-    scene = mi.load_dict(preview({"type": "micrograin", **GRAINS, "base": {"type": "diffuse"}}, size=(32, 32), spp=4), parallel=False)
+    scene = mi.load_dict(
+        preview({"type": "micrograin", **GRAINS, "base": {"type": "diffuse"}}, size=(32, 32), spp=4), parallel=False
+    )
     params, early = mi.traverse(scene), 0
     for step in range(count):
         params["object.bsdf.tau_0.value"] = 0.1 + 0.8 * step / count

@@ -12,18 +12,25 @@ OLD = next((p for v in (15, 16) for p in Path("/usr/lib").glob(f"**/libLLVM-{v}.
 
 def run(code: str, **environment: str) -> subprocess.CompletedProcess:
     clean = {k: v for k, v in os.environ.items() if k != "DRJIT_LIBLLVM_PATH"}
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, env={**clean, **environment})
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, env={**clean, **environment}
+    )
 
 
 @pytest.mark.skipif(sys.platform != "linux" or os.uname().machine != "x86_64", reason="no other platform has the wheel")
 def test_the_bundled_llvm_is_chosen():
     assert llvm.bundled() is not None
-    result = run("import asperity, mitsuba; from asperity import llvm; print(llvm.loaded_version()[0], llvm.complaint())")
+    result = run(
+        "import asperity, mitsuba; from asperity import llvm; print(llvm.loaded_version()[0], llvm.complaint())"
+    )
     assert int(result.stdout.split()[0]) >= llvm.OLDEST_WORKING and "None" in result.stdout
 
 
 def test_the_users_choice_is_kept():
-    assert run("import asperity, os; print(os.environ['DRJIT_LIBLLVM_PATH'])", DRJIT_LIBLLVM_PATH="mine").stdout == "mine\n"
+    assert (
+        run("import asperity, os; print(os.environ['DRJIT_LIBLLVM_PATH'])", DRJIT_LIBLLVM_PATH="mine").stdout
+        == "mine\n"
+    )
 
 
 @pytest.mark.skipif(OLD is None, reason="this machine has no old LLVM to be warned of")

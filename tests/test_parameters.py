@@ -22,7 +22,10 @@ BAD = {
     "texture for a BSDF": ({"base": {"type": "checkerboard"}}, "base = .*: expected a BSDF"),
     "texels": (lambda: {"tau_0": bitmap(0.0, 2.0)}, "tau_0 = 2 .in its 'data'.: expected"),
     "our texture": ({"tau_0": {"type": "settled", "top": 2.0}}, "tau_0 = 2 "),
-    "colour": ({"diffuse_reflectance": {"type": "rgb", "value": [0.1, 1.4, 0]}}, r"diffuse_reflectance = \[0.1, 1.4, 0\]"),
+    "colour": (
+        {"diffuse_reflectance": {"type": "rgb", "value": [0.1, 1.4, 0]}},
+        r"diffuse_reflectance = \[0.1, 1.4, 0\]",
+    ),
     "choice": ({"masking": "corelated"}, "masking = 'corelated'. Did you mean 'correlated'"),
     "metal": ({"material": "Aur"}, "material = 'Aur'.*Did you mean 'Au'"),
     "glass": ({"int_ior": "bk8"}, "int_ior = 'bk8': .*bk7"),
@@ -41,7 +44,7 @@ BAD = {
 @pytest.mark.parametrize("given, message", BAD.values(), ids=BAD)
 def test_bad_input_is_named(rgb, given, message):
     given = given() if callable(given) else given
-    with pytest.raises(RuntimeError, match=f"ParameterError: (.*){message}"):
+    with pytest.raises(RuntimeError, match=rf"ParameterError: (.*){message}"):
         mi.load_dict({"type": "micrograin", **given})
 
 

@@ -50,8 +50,14 @@ def test_switching_there_and_back():
 
 def test_evaluates_in_every_variant(any_variant):
     bsdf = mi.load_dict(DUSTY)
-    value, pdf = bsdf.eval_pdf(mi.BSDFContext(), at_normal(), mi.Vector3f(0, 0.6, 0.8))
-    assert 0 < float(dr.max(mi.unpolarized_spectrum(value), axis=None)[0] if dr.is_jit_v(value) else dr.max(value, axis=None)) < 1
+    value, _ = bsdf.eval_pdf(mi.BSDFContext(), at_normal(), mi.Vector3f(0, 0.6, 0.8))
+    assert (
+        0
+        < float(
+            dr.max(mi.unpolarized_spectrum(value), axis=None)[0] if dr.is_jit_v(value) else dr.max(value, axis=None)
+        )
+        < 1
+    )
     albedo = bsdf.eval_diffuse_reflectance(at_normal())
     assert "nan" not in str(albedo)
 
@@ -75,7 +81,9 @@ def test_the_entry_point_of_mitsuba_3_10():
 
 def test_traverse_finds_what_is_used(rgb):
     params = mi.traverse(mi.load_dict({**DUSTY, "tau_0": {"type": "checkerboard"}}))
-    assert {"tau_0.color0.value", "beta.value", "diffuse_reflectance.value", "base.reflectance.value"} <= set(params.keys())
+    assert {"tau_0.color0.value", "beta.value", "diffuse_reflectance.value", "base.reflectance.value"} <= set(
+        params.keys()
+    )
     assert not any(key.startswith(("int_ior", "eta", "beta_x")) for key in params.keys())  # noqa: SIM118
 
 
@@ -91,7 +99,9 @@ def test_flags_follow_the_parameters(rgb):
 
 def test_components_add_up(rgb):
     """Each component alone, the base's counted after the grains', sums to the whole."""
-    bsdf = mi.load_dict({"type": "micrograin", "int_ior": 1.5, "base": {"type": "roughdielectric", "distribution": "ggx"}})
+    bsdf = mi.load_dict(
+        {"type": "micrograin", "int_ior": 1.5, "base": {"type": "roughdielectric", "distribution": "ggx"}}
+    )
     wo = dr.normalize(mi.Vector3f(0.3, 0.2, 0.9))
     whole = bsdf.eval(mi.BSDFContext(), at_normal(), wo)
     parts = [
@@ -103,7 +113,9 @@ def test_components_add_up(rgb):
 
 def test_albedo_is_right(rgb):
     """Against 10^6 random samples; 256 stratified ones are good to 1 %."""
-    bsdf = mi.load_dict({"type": "micrograin", "material": "Au", "tau_0": 0.4, "beta": 0.5, "base": {"type": "diffuse"}})
+    bsdf = mi.load_dict(
+        {"type": "micrograin", "material": "Au", "tau_0": 0.4, "beta": 0.5, "base": {"type": "diffuse"}}
+    )
     n = 1 << 20
     rng = mi.PCG32(size=n)
     _, weight = bsdf.sample(
@@ -125,7 +137,8 @@ def test_gradients_reach_a_scene_parameter(rgb):
             "type": "scene",
             "integrator": {"type": "prb", "max_depth": 3},
             "light": {"type": "constant"},
-            "sensor": {"type": "perspective", "to_world": mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]),
+            "sensor": {"type": "perspective",
+                       "to_world": mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]),
                        "film": {"type": "hdrfilm", "width": 8, "height": 8}},
             "ball": {"type": "sphere", "bsdf": {"type": "micrograin", "material": "Au", "tau_0": 0.4}},
         }, parallel=False,

@@ -62,14 +62,15 @@ def complaint() -> str | None:
     number = ".".join(map(str, version))
     problem = f"Dr.Jit loaded LLVM {number}, with which Mitsuba aborts the process as soon as it renders."
     if "DRJIT_LIBLLVM_PATH" in os.environ and os.environ["DRJIT_LIBLLVM_PATH"] != str(bundled()):
+        chosen = os.environ["DRJIT_LIBLLVM_PATH"]
         cure = (
-            f"DRJIT_LIBLLVM_PATH is {os.environ['DRJIT_LIBLLVM_PATH']!r}: unset it, or let it name LLVM {OLDEST_WORKING} "
-            "or newer, and start Python again."
+            f"DRJIT_LIBLLVM_PATH is {chosen!r}: unset it, or let it name LLVM {OLDEST_WORKING} or newer, "
+            "and start Python again."
         )
     elif path := bundled():
         cure = (
-            "asperity brought a newer one, but drjit or mitsuba was imported first. Import asperity before them, or set "
-            f"DRJIT_LIBLLVM_PATH={path} before starting Python."
+            "asperity brought a newer one, but drjit or mitsuba was imported first. Import asperity before them, "
+            f"or set DRJIT_LIBLLVM_PATH={path} before starting Python."
         )
     else:
         cure = (

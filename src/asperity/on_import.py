@@ -1,4 +1,4 @@
-"""Registers the plugins right after Mitsuba is imported, so that ``import asperity`` and ``asperity --help`` are instant."""
+"""Registers the plugins right after Mitsuba is imported: ``import asperity`` and ``asperity --help`` are instant."""
 
 from __future__ import annotations
 

@@ -45,6 +45,9 @@ class Parameter:
     def __set_name__(self, owner: type, name: str) -> None:
         object.__setattr__(self, "name", name)
 
+    def __get__(self, model: Any, owner: type) -> Any:
+        return self  # on the class; a loaded model's own attribute, the parsed value, comes first
+
     def names(self) -> tuple[str, ...]:
         """Names that a scene may give for this parameter."""
         return (self.name,)

@@ -31,7 +31,7 @@ SPREAD = {
         "multiple diffuse": {"scattering": "multiple", "tau_0": 0.5, "specular": False, "diffuse_reflectance": 0.9},
     }
 }
-SLOW_TO_DIFFERENTIATE = {"coated", "diffuse anisotropic", "glass base", "multiple diffuse"}
+SLOW_TO_DIFFERENTIATE = {"by height", "coated", "diffuse anisotropic", "glass base", "multiple diffuse"}
 """Their derivatives unroll the quadrature: half a minute of compiling each. `asperity check` has no such exception."""
 
 CASES = [(model, case) for model, cases in SPREAD.items() for case in cases]

@@ -27,7 +27,7 @@ def integrate(f: Callable[[Any], tuple], n: int, like: Any) -> tuple:
     if not dr.is_jit_v(like) or dr.grad_enabled(first := f(type(like)(nodes[0]))):
         terms = [[weight * value for value in f(node)] for node, weight in zip(nodes, weights)]
         return tuple(map(sum, zip(*terms)))
-    Float, UInt = type(like), dr.uint32_array_t(type(like))  # noqa: N806
+    Float, UInt = type(like), dr.uint32_array_t(type(like))
     nodes, weights = Float(nodes), Float(weights)
 
     def add(index, totals):

@@ -1,10 +1,12 @@
 """The registry: one line a model."""
 
+from typing import Any
+
 from .micrograin import Micrograin
 from .textures import Settled
 
-MODELS = {"micrograin": Micrograin}
+MODELS: dict[str, Any] = {"micrograin": Micrograin}
 """BSDF plugins by the name that a scene uses."""
 
-TEXTURES = {"settled": Settled}
+TEXTURES: dict[str, Any] = {"settled": Settled}
 """Texture plugins by the name that a scene uses."""

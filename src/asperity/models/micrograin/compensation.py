@@ -1,8 +1,8 @@
 """Returns the energy that grains and base pass on to each other: a compensation lobe with two species.
 
-Not in the paper, whose model is single scattering. The idea is Kulla and Conty's (2017), for two materials: light that is
-lost after meeting a grain or the base first is returned spread like that loss. How often it meets either again follows
-from the exact form factors of the furnace. Reciprocal; closes the white furnace; no fitted constants.
+Not in the paper, whose model is single scattering. The idea is Kulla and Conty's (2017), for two materials: light that
+is lost after meeting a grain or the base first is returned spread like that loss. How often it meets either again
+follows from the exact form factors of the furnace. Reciprocal; closes the white furnace; no fitted constants.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class LossTable:
         tau_0 = np.maximum(np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2, 1e-4)  # dense at both ends
         root = (np.arange(COSINES) + 0.5) / COSINES
         azimuth = np.linspace(0, np.pi / 2, self.azimuths)
-        grid = np.meshgrid(tau_0, root**2, azimuth, indexing="ij")
-        losses, visible = _losses(*grid, beta_x, beta_y, diffuse)
+        tau_grid, cos, turned = np.meshgrid(tau_0, root**2, azimuth, indexing="ij")
+        losses, visible = _losses(tau_grid, cos, turned, beta_x, beta_y, diffuse)
         # All of it is proportional to tau_0 where that is small, so the tables hold the ratio to it.
         self.losses = _table(mi.Texture3f, losses / tau_0[:, None, None, None])
         turn = np.ones(1) if self.azimuths == 1 else np.r_[0.5, np.ones(self.azimuths - 2), 0.5] / (self.azimuths - 1)
@@ -91,7 +91,7 @@ def lobe(tau_0, loss: Loss, seen_i, seen_o, grain, base):
 
 def _losses(tau_0, cos, azimuth, beta_x, beta_y, diffuse):
     """(L_S, L_B) and tau_i on a grid of filling factors and directions, by quasi-Monte Carlo."""
-    Float, Vector = _array_types()  # noqa: N806
+    Float, Vector = _array_types()
 
     def spread(x):
         return dr.repeat(Float(np.ascontiguousarray(x.ravel(), dtype=np.float32)), SAMPLES)
@@ -158,7 +158,7 @@ def _array_types():
     return llvm.Float, llvm.Array3f
 
 
-def _cosine_hemisphere(Vector, u, v):  # noqa: N803
+def _cosine_hemisphere(Vector, u, v):
     radius, (sin, cos) = dr.sqrt(u), dr.sincos(2 * dr.pi * v)
     return Vector(radius * cos, radius * sin, dr.safe_sqrt(1 - u))
 

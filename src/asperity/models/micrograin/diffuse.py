@@ -20,10 +20,12 @@ from ...microfacet.quadrature import gauss_legendre, integrate
 from .grains import exposure
 from .shadows import Shadows, shadow, to_sphere
 
-HEIGHTS, AZIMUTHS = 16, 8
-"""Nodes. Against 300 nodes, over 20 000 random parameters and directions (cosines >= 0.03, a third near retro), the
-relative error is 0.02 % in the mean, under 0.46 % in 99.9 % and under 0.35 % wherever the value exceeds 0.05; the worst,
-0.9 %, are back-lit directions of value 0.001. Eight nodes reach 3 % there, hence not fewer."""
+HEIGHTS, AZIMUTHS = 16, (16, 8)
+"""Nodes; those in azimuth for the front arc and for the back one, which is mostly empty.
+
+Against many nodes, over random parameters and directions (cosines >= 0.03, a third near retro-reflection), the relative
+error is 0.02 % in the mean, under 0.5 % in 99.8 % of all and wherever the value exceeds 0.05; the worst are 0.9 %, in
+back-lit directions of value 0.001. Half the nodes have ten times the error."""
 
 
 class Integral(NamedTuple):
@@ -136,8 +138,8 @@ class _Azimuth:
         radius = dr.safe_sqrt(1 - h * h)
         forward_x, forward_y = self.i.x / self.radius_i, self.i.y / self.radius_i
         forward_x = dr.select(self.radius_i > 1e-6, forward_x, 1)
-        for start, end in self.arcs(h):
-            for t, weight in zip(*gauss_legendre(AZIMUTHS)):
+        for (start, end), count in zip(self.arcs(h), AZIMUTHS):
+            for t, weight in zip(*gauss_legendre(count)):
                 sin, cos = dr.sincos(start + t * (end - start))
                 sin *= self.turn
                 m = type(self.i)(

@@ -77,11 +77,12 @@ class Micrograin(Declared):
     """Half-ellipsoidal opaque grains, Poisson-distributed over a base of any BSDF.
 
     Grains are metal (the default), diffuse (``specular: false``), or diffuse under a dielectric coat (as soon as
-    ``diffuse_reflectance`` or an index of refraction is given). For single scattering the model is exact for its geometry.
+    ``diffuse_reflectance`` or an index of refraction is given). For single scattering the model is exact for its
+    geometry.
     """
 
     citation = CITATION
-    table_key: tuple | None = None
+    table_betas: tuple[float, float] | None = None
 
     tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1)
     beta = Texture(
@@ -102,7 +103,9 @@ class Micrograin(Declared):
         "shadows: by height and direction (Eq. 18), by height only (Eq. 17), or Smith's (2023)",
         options=("correlated", "height", "smith"),
     )
-    scattering = Choice("multiple returns what single scattering loses; beta is constant then", options=("single", "multiple"))
+    scattering = Choice(
+        "multiple returns what single scattering loses; beta is constant then", options=("single", "multiple")
+    )
     base = BSDF("what the grains lie on; black if none")
 
     def configure(self, given: set[str]) -> None:
@@ -121,7 +124,9 @@ class Micrograin(Declared):
         if self.variation != "none" and second is None:
             needed = "diffuse_reflectance_2" if self.diffuse else "material_2, or eta_2 and k_2, or reflectivity_2"
             raise ParameterError(f"variation = {self.variation!r}: needs a second colour, {needed}.")
-        if self.variation == "none" and (unused := sorted((metal_2 | {"diffuse_reflectance_2", "variation_azimuth"}) & given)):
+        if self.variation == "none" and (
+            unused := sorted((metal_2 | {"diffuse_reflectance_2", "variation_azimuth"}) & given)
+        ):
             raise ParameterError(f'{unused[0]}: needs variation = "height" or "normal".')
         if self.masking == "smith" and (self.scattering != "single" or self.variation != "none"):
             raise ParameterError('masking = "smith": its grains scatter once and have no height; leave out the rest.')
@@ -139,7 +144,9 @@ class Micrograin(Declared):
     def components(self) -> list[int]:
         """Flags of the grains' lobes and then of the base's."""
         front = mi.BSDFFlags.FrontSide | (0 if self.isotropic else mi.BSDFFlags.Anisotropic)
-        glossy, diffuse = (int(flag | front) for flag in (mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.DiffuseReflection))
+        glossy, diffuse = (
+            int(flag | front) for flag in (mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.DiffuseReflection)
+        )
         cls = type(self)
         self.lobes = []
         if self.specular:
@@ -154,9 +161,9 @@ class Micrograin(Declared):
     def update(self) -> None:
         """Bring up to date what is made from the parameters."""
         if self.scattering == "multiple":
-            key = (*(self._constant(beta) for beta in self.betas), self.diffuse)
-            if key != self.table_key:
-                self.table, self.table_key = LossTable(*key), key
+            beta_x, beta_y = (self._constant(beta) for beta in self.betas)
+            if (beta_x, beta_y) != self.table_betas:
+                self.table, self.table_betas = LossTable(beta_x, beta_y, self.diffuse), (beta_x, beta_y)
 
     def eval_pdf(self, ctx, si, wo, active):
         """(f |cos_o|, solid-angle density of `sample`): the sum of the lobes (Lucas 2024, Eq. 20)."""
@@ -203,9 +210,11 @@ class Micrograin(Declared):
         rejected = on_base & dr.all(mi.unpolarized_spectrum(base_weight) == 0) & stale
         pdf = dr.select(rejected, 0, pdf)
         weight = value / dr.maximum(pdf, TINY) & (pdf > 0)
-        # A mirror, clear glass, or a hole in the base: nobody else reaches its direction, and eval_pdf does not know it.
+        # A mirror, clear glass, or a hole in the base: no other lobe reaches its direction, and eval_pdf is zero there.
         delta = on_base & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-        single = mi.unpolarized_spectrum(base_weight) * self._pores(si.wi, bs.wo, grains) / dr.maximum(base_chance, TINY)
+        single = (
+            mi.unpolarized_spectrum(base_weight) * self._pores(si.wi, bs.wo, grains) / dr.maximum(base_chance, TINY)
+        )
         bs.pdf = dr.select(delta, bs.pdf * base_chance, pdf)
         return bs, dr.select(delta, single, weight) & active
 
@@ -290,7 +299,9 @@ class Micrograin(Declared):
         if self.masking == "smith":
             through = (1 - coat(wi.z)) * (1 - coat(wo.z)) if coat else 1
             cosine = wo.z / dr.pi
-            return albedo * smith.grain_weight(grains.r, grains.to_sphere(wi), grains.to_sphere(wo)) * through * cosine, cosine
+            return albedo * smith.grain_weight(
+                grains.r, grains.to_sphere(wi), grains.to_sphere(wo)
+            ) * through * cosine, cosine
         first, second, pdf = lambertian(
             *grains[1:],
             wi,
@@ -354,7 +365,10 @@ class Micrograin(Declared):
         reflect, cosines = self._fresnel if self.specular else None, zip(*gauss_legendre(4))
         mean = mi.UnpolarizedSpectrum(0)
         if reflect:
-            mean = sum(2 * cos * weight * reflect(si, active, mi.Float(cos), 0.5, mi.Vector3f(0, 0, 1)) for cos, weight in cosines)
+            mean = sum(
+                2 * cos * weight * reflect(si, active, mi.Float(cos), 0.5, mi.Vector3f(0, 0, 1))
+                for cos, weight in cosines
+            )
         if self.diffuse:
             albedo = self.diffuse_reflectance.eval(si, active)
             if self.variation != "none":

@@ -54,20 +54,21 @@ class Shadows:
     """The two shadows along ``i`` and ``o``, which may overlap (Lucas 2024, Appendix B).
 
     Where their outlines cross, p.(i - o) = 0. In the angle psi around one shadow's cylinder, counted from its deepest
-    point towards the other shadow, that is linear: B cos(psi) - A sin(psi) = (1 - i.o) h. Clipping psi at the silhouette
-    points, +-alpha, yields the paper's three cases without telling them apart.
+    point towards the other shadow, that is linear: B cos(psi) - A sin(psi) = (1 - i.o) h. Clipping psi at the
+    silhouette points, +-alpha, yields the paper's three cases without telling them apart.
     """
 
     def __init__(self, i, o):
         self.i, self.o = i, o
         x, y = i.x - o.x, i.y - o.y  # differences first: i.o and cross products lose all digits near retro-reflection
-        # i.z - o.z of unit vectors, from the other two: were it rounded on its own, i and o that differ in z alone, by a
-        # few ulp, would seem to cast shadows apart.
+        # i.z - o.z of unit vectors, from the other two: were it rounded on its own, i and o that differ in z alone, by
+        # a few ulp, would seem to cast shadows apart.
         z = -(x * (i.x + o.x) + y * (i.y + o.y)) / (i.z + o.z)
         one_minus_cos = (x * x + y * y + z * z) / 2
         cross = dr.abs(i.x * y - i.y * x)
         self.sides = [
-            self._side(w, cross, along, one_minus_cos) for w, along in ((i, i.x * x + i.y * y), (o, -(o.x * x + o.y * y)))
+            self._side(w, cross, along, one_minus_cos)
+            for w, along in ((i, i.x * x + i.y * y), (o, -(o.x * x + o.y * y)))
         ]
 
     @staticmethod
@@ -90,8 +91,8 @@ class Shadows:
     def _half(h, sin, cos, level, sin_axis, cos_axis):
         """A shadow less its half of the overlap, which ends at psi = crossing - axis.
 
-        sigma - [alpha - psi - h sin (sin alpha - sin psi)] / (2 cos) + (1 - h^2) (gamma - eta) / 2: the angles come in the
-        sums alpha + psi and gamma + eta, each a single arc tangent. eta is psi as seen from the centre of the disc.
+        sigma - [alpha - psi - h sin (sin alpha - sin psi)] / (2 cos) + (1 - h^2) (gamma - eta) / 2: the angles come in
+        the sums alpha + psi and gamma + eta, each a single arc tangent. eta is psi as seen from the disc's centre.
         """
         cos_alpha, cos_crossing = dr.minimum(h / sin, 1), dr.minimum(level * h, 1)
         sin_alpha, sin_crossing = (dr.safe_sqrt((1 - x) * (1 + x)) for x in (cos_alpha, cos_crossing))

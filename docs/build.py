@@ -1,0 +1,59 @@
+"""Writes what in the documentation comes from the code: `python docs/build.py [--pictures]`.
+
+The parameter tables always (a test holds them to the declarations), the pictures on request: they take two minutes.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+DOCS = Path(__file__).parent
+BEGIN, END = "<!-- parameters: made by docs/build.py -->", "<!-- end of parameters -->"
+STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", "dirty-weave")
+
+
+def table(model) -> str:
+    """A model's parameters, in Markdown."""
+    lines = ["| name | value | default | allowed | unit | meaning |", "|---|---|---|---|---|---|"]
+    lines += ["| `" + row.name + "` | " + " | ".join(row[1:]) + " |" for row in model.rows()]
+    return "\n".join(lines)
+
+
+def with_table(page: str, model) -> str:
+    """The page with the model's table between the marks."""
+    before, rest = page.split(BEGIN)
+    return f"{before}{BEGIN}\n{table(model)}\n{END}{rest.split(END)[1]}"
+
+
+def strip(path: Path, size: int = 256, spp: int = 256) -> None:
+    """Six presets side by side."""
+    import mitsuba as mi
+    import numpy as np
+
+    from asperity.scenes import presets
+    from asperity.scenes.preview import preview
+
+    mi.set_variant("llvm_ad_rgb")
+    images = []
+    for name in STRIP:
+        preset = presets.load(name)
+        scene = preview(preset.material, **preset.preview, size=(size, size), spp=spp)
+        images.append(np.asarray(mi.render(mi.load_dict(scene, parallel=False))))
+    mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)[..., :3]), write_async=False)
+
+
+def main() -> None:
+    """Write the tables, and the pictures if asked."""
+    import asperity  # noqa: F401  (before Mitsuba)
+    from asperity.models import MODELS
+
+    for name, model in MODELS.items():
+        page = DOCS / f"{name}.md"
+        page.write_text(with_table(page.read_text(), model))
+    if "--pictures" in sys.argv[1:]:
+        strip(DOCS / "pictures" / "presets.png")
+
+
+if __name__ == "__main__":
+    main()
