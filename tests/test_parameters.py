@@ -44,7 +44,8 @@ BAD = {
 @pytest.mark.parametrize("given, message", BAD.values(), ids=BAD)
 def test_bad_input_is_named(rgb, given, message):
     given = given() if callable(given) else given
-    with pytest.raises(RuntimeError, match=rf"ParameterError: (.*){message}"):
+    pattern = f"ParameterError: (.*){message}"
+    with pytest.raises(RuntimeError, match=pattern):
         mi.load_dict({"type": "micrograin", **given})
 
 

@@ -4,10 +4,11 @@ import sys
 import weakref
 from importlib.metadata import entry_points
 
-import asperity  # noqa: F401  isort: skip
 import drjit as dr
 import mitsuba as mi
 import pytest
+
+import asperity
 
 DUSTY = {"type": "micrograin", "tau_0": 0.4, "specular": False, "base": {"type": "diffuse"}}
 

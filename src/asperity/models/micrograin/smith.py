@@ -1,8 +1,8 @@
 """Grains with Smith's masking: heights independent of normals, and of each other (Lucas et al. 2023).
 
-The published baseline of the micrograin model, as Lucas 2024 recalls it in Eq. 1 to 6. Two of its pieces are not
-printed there and were filled in: the masking function follows from Smith's condition that the visible normals project to
-the whole surface, and the transmission T of a coated grain is taken for the macroscopic angles.
+The published baseline of the micrograin model, as Lucas 2024 recalls it in Eq. 1 to 6. Two pieces are not printed there
+and were filled in: the masking function follows from Smith's condition that the visible normals project to the whole
+surface, and the transmission T of a coated grain is taken for the macroscopic angles.
 """
 
 from __future__ import annotations
