@@ -112,11 +112,6 @@ def uniform_hemisphere(n: int, seed: int) -> mi.Vector3f:
     return mi.warp.square_to_uniform_hemisphere(variates(n, seed)[1])
 
 
-def cosine_hemisphere(n: int, seed: int) -> mi.Vector3f:
-    """Return ``n`` directions over the upper hemisphere, with density cos θ / π."""
-    return mi.warp.square_to_cosine_hemisphere(variates(n, seed)[1])
-
-
 def hard_directions() -> np.ndarray:
     """Return directions (n, 3) that formulas divide by zero at: grazing, horizontal, normal; on both sides."""
     cosines = np.array([1, 0.7, 0.3, *10.0 ** -np.arange(1, 7), 0])
