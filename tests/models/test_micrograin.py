@@ -7,9 +7,12 @@ randomness moves an albedo by up to 0.003; issue 3's goniophotometer will replac
 import asperity  # noqa: F401  isort: skip
 import drjit as dr
 import drjit.llvm.ad as llvm
+import drjit.scalar as scalar
 import mitsuba as mi
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from asperity.models.micrograin import diffuse
 from asperity.models.micrograin.diffuse import lambertian
@@ -76,6 +79,21 @@ def test_union_of_shadows_is_what_rays_see():
     for i, o, h in zip(directions(rng, 12, 0.3).T, directions(rng, 12, 0.3).T, rng.uniform(0, 0.9, 12)):
         union = Shadows(llvm.Array3f64(*map(float, i)), llvm.Array3f64(*map(float, o))).union(llvm.Float64(h))
         assert float(union[0]) == pytest.approx(area_by_counting(i, o, h), abs=0.01)
+
+
+def directions_of_floats():
+    """Unit vectors above the horizon, as plain floats in double precision."""
+    angles = st.tuples(st.floats(0, 1.55), st.floats(-3.2, 3.2))
+    return angles.map(lambda a: np.array([np.sin(a[0]) * np.cos(a[1]), np.sin(a[0]) * np.sin(a[1]), np.cos(a[0])]))
+
+
+@given(i=directions_of_floats(), o=directions_of_floats(), h=st.floats(0, 1))
+def test_a_union_is_between_the_larger_shadow_and_the_sum(i, o, h):
+    """On plain floats: the formulas ask for no array type."""
+    i, o = (scalar.Array3f64(*map(float, w)) for w in (i, o))
+    sigma_i, sigma_o, union = shadow(i, h), shadow(o, h), Shadows(i, o).union(h)
+    rounding = 1e-6 * (1 + sigma_i + sigma_o)
+    assert max(sigma_i, sigma_o) - rounding <= union <= sigma_i + sigma_o + rounding
 
 
 @pytest.mark.parametrize("family", families(np.random.default_rng(0), 2))
