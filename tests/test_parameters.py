@@ -35,6 +35,12 @@ BAD = {
     "metal and albedo": ({"material": "Au", "diffuse_reflectance": 0.3}, "material.*exclude each other"),
     "metal without specular": ({"material": "Au", "specular": False}, "exclude each other"),
     "no second colour": ({"variation": "height"}, "needs a second colour"),
+    "second colour of a mirror": ({"variation": "height", "material_2": "Au"}, 'needs two metals; material "none"'),
+    "spectrum for a number": (
+        {"tau_0": {"type": "irregular", "wavelengths": "400, 500, 600", "values": ".1, .2, .3"}},
+        "tau_0: a spectrum, where one number is expected",
+    ),
+    "two bases": ({"base": {"type": "diffuse"}, "other": {"type": "diffuse"}}, "no parameter 'other'"),
     "unused second colour": ({"material_2": "Au"}, "material_2: needs variation"),
     "Smith and more": ({"masking": "smith", "scattering": "multiple"}, "masking = .smith."),
     "textured beta": (lambda: {"beta": bitmap(0.5, 1.0), "scattering": "multiple"}, "beta: a texture"),
@@ -60,6 +66,13 @@ def test_an_update_is_checked_but_an_optimiser_is_free(rgb):
     dr.enable_grad(value)
     params["tau_0.value"] = value
     params.update()
+
+
+def test_our_textures_are_checked_on_update(rgb):
+    params = mi.traverse(mi.load_dict({"type": "settled"}))
+    params["softness.value"] = 0.0
+    with pytest.raises(ValueError, match="softness = 0"):
+        params.update()
 
 
 def test_a_nested_texture_has_its_own_ranges(rgb):

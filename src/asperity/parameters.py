@@ -108,6 +108,11 @@ class Texture(Parameter):
         except RuntimeError as error:
             raise self.wrong(name, props.as_string(name)) from error
         self.check(texture)
+        if not isinstance(self, Colour) and not texture.is_spatially_varying():
+            try:
+                texture.eval_1(dr.zeros(mi.SurfaceInteraction3f))
+            except RuntimeError as error:
+                raise ParameterError(f"{name}: a spectrum, where one number is expected.") from error
         return texture
 
     def get(self, props: mi.Properties, name: str) -> Any:
@@ -325,10 +330,13 @@ class BSDF(Parameter):
 
     def parse(self, props: mi.Properties) -> Any:
         """The nested plugin, or None."""
-        name = next((n for n in (self.name, *props.keys()) if is_unnamed(n) or self.name in props), None)
-        if name is None:
+        unnamed = [name for name in props.keys() if is_unnamed(name) and isinstance(props[name], mi.BSDF)]  # noqa: SIM118
+        names = [self.name] * (self.name in props) + unnamed
+        if len(names) > 1:
+            raise ParameterError(f"{self.name}: {len(names)} nested BSDFs are given, one is allowed.")
+        if not names:
             return None
-        given = props[name]
+        given = props[names[0]]
         if not isinstance(given, mi.BSDF):
             raise self.wrong(self.name, given.class_name() if isinstance(given, mi.Object) else repr(given))
         return given

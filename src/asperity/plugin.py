@@ -43,8 +43,8 @@ def _bsdf(model_class: Any, variant: str) -> type:
         """Mitsuba's view of a model: flags, components, polarisation, traversal; the physics is the model's."""
 
         def __init__(self, props: mi.Properties) -> None:
+            self.model = model_class.parse(props)  # first: Mitsuba's constructor makes this BSDF known to all threads
             mi.BSDF.__init__(self, props)
-            self.model = model_class.parse(props)
             self.m_components = self.model.components()
             self.m_flags = 0
             for flags in self.m_components:
@@ -111,6 +111,9 @@ def _texture(model_class: Any, variant: str) -> type:
 
         def is_spatially_varying(self) -> bool:
             return True
+
+        def parameters_changed(self, keys: list[str]) -> None:
+            self.model.check()
 
         def traverse(self, callback: mi.TraversalCallback) -> None:
             for name, child in self.model.children().items():

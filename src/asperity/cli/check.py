@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from asperity.errors import ParameterError
+from asperity.errors import ParameterError, UnknownNameError
 
 from . import console, materials, output, variants
 
@@ -24,6 +24,7 @@ def check(
     preset: materials.PresetName = None,
     material: materials.MaterialFile = None,
     pictures: Annotated[Path, typer.Option(help="Folder for pictures of what failed.")] = Path("asperity-check"),
+    only: Annotated[list[str] | None, typer.Option(help="A check to run instead of all; repeatable.")] = None,
     variant: variants.Variant = None,
 ) -> None:
     """Check a BSDF: sampling, reciprocity, energy, gradients and more. The exit code is 1 if a check fails."""
@@ -40,10 +41,13 @@ def check(
         materials.check_material(description)
         from asperity.lab import checks
 
+    names = only or checks.NAMES
+    for unknown in set(names) - set(checks.NAMES):
+        raise UnknownNameError("check", unknown, checks.NAMES)
     with console.progress("checks") as progress:
-        task = progress.add_task("", total=len(checks.NAMES))
+        task = progress.add_task("", total=len(names))
         results = checks.check(
-            description, lambda name, done, _: progress.update(task, description=name, completed=done)
+            description, lambda name, done, _: progress.update(task, description=name, completed=done), names
         )
     report(results)
     failures = [result for result in results if result.passed is False]

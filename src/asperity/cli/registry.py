@@ -22,6 +22,16 @@ def model(name: str) -> Any:
     return models()[name]
 
 
+def described(name: str) -> Any:
+    """The model or the texture of that name."""
+    from asperity.models import TEXTURES
+
+    known = models() | TEXTURES
+    if name not in known:
+        raise UnknownNameError("model, texture or preset", name, known)
+    return known[name]
+
+
 def about(model: Any) -> str:
     """The docstring of a model, without its quotation marks for code."""
     return inspect.getdoc(model).replace("``", "")  # type: ignore[union-attr]  # D1: all models have one

@@ -17,8 +17,12 @@ def load(path: Path, size: tuple[int, int] | None) -> Any:
     """The scene in a file, its picture resized if ``size`` is given."""
     import mitsuba as mi
 
+    from asperity.scenes import presets
+
+    if path.name in presets.names():
+        raise ParameterError(f"{path.name} is a preset, not a scene file: asperity render --preset {path.name}")
     readable("scene", path, FORMATS)
-    # Mitsuba would call Python plugins from several threads, and wait forever.
+    # Mitsuba's advice for scenes with plugins in Python: it would construct them from several threads.
     if path.suffix.lower() == ".xml":
         scene = mi.load_file(str(path), parallel=False)
     else:

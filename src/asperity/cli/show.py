@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated
 
 import typer
@@ -9,12 +10,21 @@ from rich.table import Table
 
 from . import console, registry
 
+Name = Annotated[str, typer.Argument(metavar="NAME", help="A model, texture or preset that `asperity list` shows.")]
 
-def show(model: Annotated[str, typer.Argument(metavar="MODEL", help="A name that `asperity list` shows.")]) -> None:
-    """Show what a model is, and its parameters."""
-    found = registry.model(model)
+
+def show(name: Name) -> None:
+    """Show what a model is and its parameters, or what a preset is made of."""
+    from asperity.scenes import presets
+
     out = console.stdout()
-    out.print(f"{model}: {registry.about(found)}\n")
+    if name in presets.names():
+        preset = presets.load(name)
+        out.print(f"{preset.title} ({preset.source}). {preset.about}\n")
+        typer.echo(json.dumps(preset.material, indent=2, default=str))
+        return
+    found = registry.described(name)
+    out.print(f"{name}: {registry.about(found)}\n")
     table = Table("parameter", "kind", "default", "allowed", "unit", "meaning")
     for row in found.rows():
         table.add_row(*row)

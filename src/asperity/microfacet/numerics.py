@@ -21,9 +21,3 @@ def one_minus_exp(x):
     """1 - exp(-x) for x >= 0."""
     series = x * (1 - x * (1 / 2 - x * (1 / 6 - x * (1 / 24))))
     return dr.select(x < SMALL, series, 1 - dr.exp(-x))
-
-
-def arccos(x):
-    """Arc cosine of x in [-1, 1], clipped there; atan2 keeps the gradient finite at both ends."""
-    x = dr.clip(x, -1, 1)
-    return dr.atan2(dr.safe_sqrt((1 - x) * (1 + x)), x + 1e-20)

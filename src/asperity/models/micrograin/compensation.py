@@ -7,18 +7,21 @@ follows from the exact form factors of the furnace. Reciprocal; closes the white
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from scipy.interpolate import RegularGridInterpolator
 from scipy.stats import qmc
 
 from .grains import density, sample_visible_normal, visible_fraction
-from .shadows import Shadows, lift, shadow, to_sphere
+from .shadows import GRAZING, Shadows, lift, shadow, to_sphere
 
-FILLINGS, COSINES, AZIMUTHS = 25, 32, 7
-"""Nodes of the tables: in arcsin(sqrt(tau_0)), in the root of the cosine, and in the azimuth of the first quadrant."""
+FILLINGS, COSINES, AZIMUTHS = 25, 48, 7
+"""Nodes of the tables: in arcsin(sqrt(tau_0)), and in sphere space, where losses vary evenly whatever beta: in the root
+of the cosine, and in the azimuth of the first quadrant."""
 SAMPLES = 4096
 
 
@@ -32,19 +35,21 @@ class Loss(NamedTuple):
 
 
 class LossTable:
-    """Losses for constant ``beta_x`` and ``beta_y`` and any filling factor; ``diffuse`` grains, or mirrors."""
+    """Losses for constant ``beta_x`` and ``beta_y`` and any filling factor; ``diffuse`` grains, or mirrors.
 
-    def __init__(self, beta_x: float, beta_y: float, diffuse: bool):
+    ``shaded(shadows, h)`` is the choice of masking.
+    """
+
+    def __init__(self, beta_x: float, beta_y: float, diffuse: bool, shaded: Callable[[Shadows, Any], Any]):
+        self.beta_x, self.beta_y = beta_x, beta_y
         self.azimuths = 1 if beta_x == beta_y else AZIMUTHS
         tau_0 = np.maximum(np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2, 1e-4)  # dense at both ends
-        root = (np.arange(COSINES) + 0.5) / COSINES
-        azimuth = np.linspace(0, np.pi / 2, self.azimuths)
-        tau_grid, cos, turned = np.meshgrid(tau_0, root**2, azimuth, indexing="ij")
-        losses, visible = _losses(tau_grid, cos, turned, beta_x, beta_y, diffuse)
+        root, azimuth = np.linspace(0, 1, COSINES), np.linspace(0, np.pi / 2, self.azimuths)
+        grid = np.meshgrid(tau_0, np.maximum(root**2, GRAZING), azimuth, indexing="ij")
+        losses, visible = _losses(grid[0], grid[1], grid[2], beta_x, beta_y, diffuse, shaded)
         # All of it is proportional to tau_0 where that is small, so the tables hold the ratio to it.
         self.losses = _table(mi.Texture3f, losses / tau_0[:, None, None, None])
-        turn = np.ones(1) if self.azimuths == 1 else np.r_[0.5, np.ones(self.azimuths - 2), 0.5] / (self.azimuths - 1)
-        mean = np.einsum("tcax,c,a->tx", np.concatenate([losses, visible], axis=-1), _cosine_weights(root), turn)
+        mean = _hemispherical_mean(np.concatenate([losses, visible], axis=-1), root, azimuth, beta_x, beta_y)
         means = np.column_stack([mean, _exposed_area(tau_0, beta_x, beta_y)])
         self.means = _table(mi.Texture1f, means / tau_0[:, None])
 
@@ -52,15 +57,15 @@ class LossTable:
         """What depends on the filling factor alone."""
         return Loss(*(tau_0 * mean for mean in self.means.eval(_centre(_filling(tau_0), FILLINGS))))
 
-    def seen(self, tau_0, w):
-        """(L_S, L_B): shares of the light along the unit vector ``w`` that meet grain or base first and are lost."""
-        azimuth = dr.atan2(dr.abs(w.y), dr.abs(w.x) + 1e-20) * (2 / dr.pi)
-        root = dr.sqrt(dr.clip(w.z, 1e-8, 1))
-        at = mi.Point3f(_centre(azimuth, self.azimuths), root, _centre(_filling(tau_0), FILLINGS))
-        return [tau_0 * loss for loss in self.losses.eval(at)]
+    def along(self, tau_0, w):
+        """(L_S, L_B): shares of the light along ``w`` that meet grain or base first and are lost."""
+        w = to_sphere(lift(w, self.beta_x, self.beta_y), self.beta_x, self.beta_y)
+        azimuth = dr.atan2(dr.abs(w.y), dr.abs(w.x) + 1e-12) * (2 / dr.pi)
+        at = (_centre(azimuth, self.azimuths), _centre(dr.sqrt(w.z), COSINES), _centre(_filling(tau_0), FILLINGS))
+        return [tau_0 * loss for loss in self.losses.eval(mi.Point3f(*at))]
 
 
-def lobe(tau_0, loss: Loss, seen_i, seen_o, grain, base):
+def lobe(tau_0, loss: Loss, lost_i, lost_o, grain, base):
     """BRDF of the returned light, for albedos ``grain`` and ``base`` (spectra) and losses (L_S, L_B) along i and o.
 
     ``blocked`` and ``between`` are the fluxes that grains pass to grains, and to the base and back.
@@ -84,22 +89,21 @@ def lobe(tau_0, loss: Loss, seen_i, seen_o, grain, base):
     d_b = ratio * d_s
 
     s, m, b = exchange(grain, base)
-    s_i, s_o = grain * (d_s * seen_i[0]), grain * (d_s * seen_o[0])
-    b_i, b_o = base * (d_b * seen_i[1]), base * (d_b * seen_o[1])
+    s_i, s_o = grain * (d_s * lost_i[0]), grain * (d_s * lost_o[0])
+    b_i, b_o = base * (d_b * lost_i[1]), base * (d_b * lost_o[1])
     return (s_i * s * s_o + m * (s_i * b_o + b_i * s_o) + b_i * b * b_o) / dr.pi
 
 
-def _losses(tau_0, cos, azimuth, beta_x, beta_y, diffuse):
-    """(L_S, L_B) and tau_i on a grid of filling factors and directions, by quasi-Monte Carlo."""
+def _losses(tau_0, cos, azimuth, beta_x, beta_y, diffuse, shaded):
+    """(L_S, L_B) and tau_i on a grid of filling factors and directions in sphere space, by quasi-Monte Carlo."""
     Float, Vector = _array_types()
 
     def spread(x):
         return dr.repeat(Float(np.ascontiguousarray(x.ravel(), dtype=np.float32)), SAMPLES)
 
-    sin = np.sqrt(1 - cos * cos)
-    wi = Vector(spread(sin * np.cos(azimuth)), spread(sin * np.sin(azimuth)), spread(cos))
-    wi, r = lift(wi, beta_x, beta_y), density(spread(tau_0))
-    i = to_sphere(wi, beta_x, beta_y)
+    r, sin = density(spread(tau_0)), np.sqrt(1 - cos * cos)
+    i = Vector(spread(sin * np.cos(azimuth)), spread(sin * np.sin(azimuth)), spread(cos))
+    wi = dr.normalize(Vector(i.x / beta_x, i.y / beta_y, i.z))
     points = qmc.Sobol(4, seed=0).random(SAMPLES).T.astype(np.float32)
     u = [dr.tile(Float(np.minimum(point, np.float32(1 - 2**-24))), cos.size) for point in points]
 
@@ -110,7 +114,7 @@ def _losses(tau_0, cos, azimuth, beta_x, beta_y, diffuse):
 
     def blocked(wo, h):  # of what is seen along i at height h, the share that is in shadow along wo
         o = to_sphere(lift(wo, beta_x, beta_y), beta_x, beta_y)
-        return 1 - dr.select(wo.z > 0, dr.exp(-r * (Shadows(i, o).union(h) - shadow(i, h))), 0)
+        return 1 - dr.select(wo.z > 0, dr.exp(-r * (shaded(Shadows(i, o), h) - shadow(i, h))), 0)
 
     visible = visible_fraction(r, i)
     columns = visible * blocked(wo, h), (1 - visible) * blocked(cosine, Float(0)), visible
@@ -127,11 +131,15 @@ def _exposed_area(tau_0, beta_x, beta_y):
     return (r * np.exp(-r * np.pi * (1 - h * h)) * stretch).mean(axis=(1, 2)) * 2 * np.pi
 
 
-def _cosine_weights(root):
-    """Weights of 2 int L cos dcos for an L that is linear in the root of the cosine between the nodes."""
-    x = (np.arange(1 << 13) + 0.5) / (1 << 13)
-    hats = np.array([np.interp(x, root, unit) for unit in np.eye(len(root))])
-    return (hats * 4 * x**3).mean(axis=1)
+def _hemispherical_mean(table, root, azimuth, beta_x, beta_y):
+    """2 int int L cos dcos dazimuth / (2 pi) over real directions, for an L linear between the nodes of ``table``."""
+    square, turn = np.meshgrid((np.arange(512) + 0.5) / 512, (np.arange(128) + 0.5) / 256 * np.pi, indexing="ij")
+    x, y = (np.sqrt(1 - square) * f(turn) for f in (np.cos, np.sin))
+    cos = np.sqrt(square / ((beta_x * x) ** 2 + (beta_y * y) ** 2 + square))
+    at = np.sqrt(cos), np.arctan2(beta_y * y, beta_x * x)
+    if len(azimuth) == 1:
+        table, azimuth = np.repeat(table, 2, axis=2), np.array([0, np.pi / 2])
+    return np.array([RegularGridInterpolator((root, azimuth), layer)(at).mean(axis=(0, 1)) for layer in table])
 
 
 def _table(texture, data):

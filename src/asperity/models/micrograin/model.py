@@ -78,7 +78,7 @@ class Micrograin(Declared):
 
     Grains are metal (the default), diffuse (``specular: false``), or diffuse under a dielectric coat (as soon as
     ``diffuse_reflectance`` or an index of refraction is given). For single scattering the model is exact for its
-    geometry.
+    geometry, with ``masking: correlated`` and without a coat, whose inner reflections are neglected.
     """
 
     citation = CITATION
@@ -124,6 +124,8 @@ class Micrograin(Declared):
         if self.variation != "none" and second is None:
             needed = "diffuse_reflectance_2" if self.diffuse else "material_2, or eta_2 and k_2, or reflectivity_2"
             raise ParameterError(f"variation = {self.variation!r}: needs a second colour, {needed}.")
+        if self.variation != "none" and not self.diffuse and (self.metal.mirror or self.metal_2.mirror):
+            raise ParameterError(f'variation = {self.variation!r}: needs two metals; material "none" has no index.')
         if self.variation == "none" and (
             unused := sorted((metal_2 | {"diffuse_reflectance_2", "variation_azimuth"}) & given)
         ):
@@ -138,23 +140,27 @@ class Micrograin(Declared):
         unused += [name for name in ("beta", "beta_x", "beta_y") if getattr(self, name) not in self.betas]
         for name in unused:
             setattr(self, name, None)
+        self.lobes = self._lobes()
         if self.scattering == "multiple":
             self.constant = {"beta", "beta_x", "beta_y"}  # they make the table
 
-    def components(self) -> list[int]:
-        """Flags of the grains' lobes and then of the base's."""
+    def _lobes(self) -> list[Lobe]:
         front = mi.BSDFFlags.FrontSide | (0 if self.isotropic else mi.BSDFFlags.Anisotropic)
         glossy, diffuse = (
             int(flag | front) for flag in (mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.DiffuseReflection)
         )
         cls = type(self)
-        self.lobes = []
+        lobes = []
         if self.specular:
-            self.lobes += [Lobe(glossy, cls._weigh_specular, cls._specular, cls._draw_specular)]
+            lobes += [Lobe(glossy, cls._weigh_specular, cls._specular, cls._draw_specular)]
         if self.diffuse:
-            self.lobes += [Lobe(diffuse, cls._weigh_diffuse, cls._diffuse, cls._draw_diffuse)]
+            lobes += [Lobe(diffuse, cls._weigh_diffuse, cls._diffuse, cls._draw_diffuse)]
         if self.scattering == "multiple":
-            self.lobes += [Lobe(diffuse, cls._weigh_multiple, cls._multiple, cls._draw_multiple)]
+            lobes += [Lobe(diffuse, cls._weigh_multiple, cls._multiple, cls._draw_multiple)]
+        return lobes
+
+    def components(self) -> list[int]:
+        """Flags of the grains' lobes and then of the base's."""
         base = [] if self.base is None else [self.base.flags(n) for n in range(self.base.component_count())]
         return [lobe.flags for lobe in self.lobes] + base
 
@@ -163,7 +169,8 @@ class Micrograin(Declared):
         if self.scattering == "multiple":
             beta_x, beta_y = (self._constant(beta) for beta in self.betas)
             if (beta_x, beta_y) != self.table_betas:
-                self.table, self.table_betas = LossTable(beta_x, beta_y, self.diffuse), (beta_x, beta_y)
+                shaded = Shadows.union if self.masking == "correlated" else Shadows.sum
+                self.table, self.table_betas = LossTable(beta_x, beta_y, self.diffuse, shaded), (beta_x, beta_y)
 
     def eval_pdf(self, ctx, si, wo, active):
         """(f |cos_o|, solid-angle density of `sample`): the sum of the lobes (Lucas 2024, Eq. 20)."""
@@ -182,7 +189,10 @@ class Micrograin(Declared):
         return dr.select(active, value, 0), dr.select(active, pdf, 0)
 
     def sample(self, ctx, si, sample1, sample2, active):
-        """Choose a lobe by how much of it is seen, draw from it, and weight all lobes by the density of all."""
+        """Choose a lobe by how much of it is seen, draw from it, and weight all lobes by the density of all.
+
+        Directions and densities carry no gradient: derivatives are those of the value at a fixed direction.
+        """
         grains, chances, base_chance = self._choose(ctx, si, active)
         wi, bs, start = grains.lift(si.wi), dr.zeros(mi.BSDFSample3f), mi.Float(0)
         bs.eta = 1
@@ -193,22 +203,25 @@ class Micrograin(Declared):
             bs.sampled_component = dr.select(chosen, mi.UInt32(n), bs.sampled_component)
             bs.sampled_type = dr.select(chosen, mi.UInt32(self.lobes[n].flags), bs.sampled_type)
             start = start + chance
+        bs.wo = dr.detach(bs.wo)
         if base_chance is None:
-            value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
+            value, pdf = self.eval_pdf(ctx, si, bs.wo, active)
+            bs.pdf = dr.detach(pdf)
             return bs, value / dr.maximum(bs.pdf, TINY) & (bs.pdf > 0)
 
         on_base = active & (sample1 >= start)
         u = _rescale(sample1, start, base_chance)
         base, base_weight = self.base.sample(self._base_context(ctx), si, u, sample2, on_base)
         base.sampled_component += len(self.lobes)
-        bs = dr.select(on_base, base, bs)
+        bs = dr.detach(dr.select(on_base, base, bs))
+        base_chance = dr.detach(base_chance)
         # The grains' lobes end at the horizon, where a transmitting base may well have a density.
         value, pdf = self.eval_pdf(ctx, si, bs.wo, active & (on_base | (bs.wo.z > 0)))
         # Mitsuba's samplers reject by a weight of zero and leave the rest as it was. A black base is not a rejection.
         there, there_pdf = self.base.eval_pdf(self._base_context(ctx), si, bs.wo, on_base)
         stale = dr.any(mi.unpolarized_spectrum(there) > 0) | (dr.abs(there_pdf - bs.pdf) > 0.01 * bs.pdf)
         rejected = on_base & dr.all(mi.unpolarized_spectrum(base_weight) == 0) & stale
-        pdf = dr.select(rejected, 0, pdf)
+        pdf = dr.detach(dr.select(rejected, 0, pdf))
         weight = value / dr.maximum(pdf, TINY) & (pdf > 0)
         # A mirror, clear glass, or a hole in the base: no other lobe reaches its direction, and eval_pdf is zero there.
         delta = on_base & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
@@ -220,8 +233,10 @@ class Micrograin(Declared):
 
     def _choose(self, ctx, si, active) -> tuple[Grains, dict[int, Any], Any]:
         """The grains here, the chance of each enabled lobe of theirs, and that of the base (None if not wanted)."""
-        tau_0 = self.tau_0.eval_1(si, active)
-        grains = Grains(tau_0, density(tau_0), *(beta.eval_1(si, active) for beta in self.betas))
+        # Ranges were checked where values could be seen. Vertex attributes and an optimiser's steps could not.
+        tau_0 = dr.clip(self.tau_0.eval_1(si, active), 0, 1)
+        beta_x, beta_y = (dr.maximum(beta.eval_1(si, active), 1e-4) for beta in self.betas)
+        grains = Grains(tau_0, density(tau_0), beta_x, beta_y)
         wi, above = grains.lift(si.wi), si.wi.z > 0
         shares = {
             n: dr.select(above, lobe.weigh(self, si, active, grains, wi), 0)
@@ -245,7 +260,8 @@ class Micrograin(Declared):
     def _pores(self, wi, wo, grains: Grains):
         """Share of the base that both directions reach, V_p (Lucas 2024, Eq. 23).
 
-        Below the surface nothing casts shadows, but light meets the base through pores only, from either side.
+        Beyond the paper, below the surface: nothing casts shadows there, but light meets the base through pores only,
+        from either side. What arrives from below under a grain is absorbed, total internal reflection included.
         """
         i, o = (grains.to_sphere(grains.lift(w)) for w in (wi, wo))
         if self.masking == "smith":
@@ -266,7 +282,11 @@ class Micrograin(Declared):
         return mi.reflect(wi, self._visible_normal(grains, wi, sample2))
 
     def _specular(self, si, active, grains: Grains, wi, wo):
-        """tau_0 D G F / (4 cos_i) (Lucas 2024, Eq. 22), by exact visible normals."""
+        """tau_0 D G F / (4 cos_i) (Lucas 2024, Eq. 22), by exact visible normals.
+
+        NDF and GAF share an exponential: tau_0 D G = pi r D_ggx exp(-r (pi (1 - h'^2) + U)) by Eq. 12 and 19, where U
+        is the area in shadow on the plane at height h'. With the shadow along i alone, G becomes G1: the density.
+        """
         m = dr.normalize(wi + wo)
         h, d_ggx = normal_in_sphere_space(m, grains.beta_x, grains.beta_y)
         i, o = grains.to_sphere(wi), grains.to_sphere(wo)
@@ -317,18 +337,18 @@ class Micrograin(Declared):
         return value, pdf / grains.visible(wi)
 
     def _weigh_multiple(self, si, active, grains, wi):
-        return sum(self.table.seen(grains.tau_0, dr.normalize(wi)))
+        return sum(self.table.along(grains.tau_0, wi))
 
     def _draw_multiple(self, si, active, grains, wi, u, sample2):
         return mi.warp.square_to_cosine_hemisphere(sample2)
 
     def _multiple(self, si, active, grains: Grains, wi, wo):
         """Light that single scattering loses (`compensation`), by cosine."""
-        seen_i, seen_o = (self.table.seen(grains.tau_0, dr.normalize(w)) for w in (wi, wo))
+        lost_i, lost_o = (self.table.along(grains.tau_0, w) for w in (wi, wo))
         base = mi.UnpolarizedSpectrum(0)
         if self.base is not None:
             base = dr.clip(self._base_albedo(si, active), 0, 1)
-        value = lobe(grains.tau_0, self.table.at(grains.tau_0), seen_i, seen_o, self._mean_albedo(si, active), base)
+        value = lobe(grains.tau_0, self.table.at(grains.tau_0), lost_i, lost_o, self._mean_albedo(si, active), base)
         return value * wo.z, wo.z / dr.pi
 
     def _visible_normal(self, grains: Grains, wi, sample2):
@@ -343,8 +363,13 @@ class Micrograin(Declared):
         """Probability of the diffuse lobe among the grains' (Lucas 2024, Eq. 27)."""
         if not self.coated:
             return 0 if self.specular else 1
-        albedo = dr.mean(self.diffuse_reflectance.eval(si, active))
-        return albedo / (albedo + self._coat(si, active)(wi.z))
+        albedo = dr.mean(self._diffuse_albedo(si, active))
+        return albedo / dr.maximum(albedo + self._coat(si, active)(wi.z), TINY)
+
+    def _diffuse_albedo(self, si, active):
+        """Mean of the two albedos, or the only one."""
+        albedo = self.diffuse_reflectance.eval(si, active)
+        return albedo if self.variation == "none" else (albedo + self.diffuse_reflectance_2.eval(si, active)) / 2
 
     def _share(self, si, active):
         """Function (h, m) for the second colour's share at a point of the grain, or None."""
@@ -361,28 +386,22 @@ class Micrograin(Declared):
         return lambda cos: mi.fresnel(cos, eta)[0]
 
     def _mean_albedo(self, si, active):
-        """Hemispherical mean of what a facet of the grain reflects."""
-        reflect, cosines = self._fresnel if self.specular else None, zip(*gauss_legendre(4))
+        """Hemispherical mean of what a facet of the grain reflects, at half height and upright."""
         mean = mi.UnpolarizedSpectrum(0)
-        if reflect:
-            mean = sum(
-                2 * cos * weight * reflect(si, active, mi.Float(cos), 0.5, mi.Vector3f(0, 0, 1))
-                for cos, weight in cosines
-            )
+        if self.specular:
+            for cos, weight in zip(*gauss_legendre(4)):
+                mean = mean + 2 * cos * weight * self._fresnel(si, active, mi.Float(cos), 0.5, mi.Vector3f(0, 0, 1))
         if self.diffuse:
-            albedo = self.diffuse_reflectance.eval(si, active)
-            if self.variation != "none":
-                albedo = (albedo + self.diffuse_reflectance_2.eval(si, active)) / 2
-            mean = mean + dr.square(1 - mean) * albedo
+            mean = mean + dr.square(1 - mean) * self._diffuse_albedo(si, active)
         return mean
 
     def _base_albedo(self, si, active):
-        """Mitsuba's diffuse reflectance where it is right, else the directional albedo at normal incidence."""
-        beyond_diffuse = int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Transmission)
-        if not self.base.flags() & beyond_diffuse:
-            return mi.unpolarized_spectrum(self.base.eval_diffuse_reflectance(si, active))
+        """Albedo at normal incidence: Mitsuba's diffuse reflectance where that is right. The same for i and o."""
         upright = mi.SurfaceInteraction3f(si)
         upright.wi = mi.Vector3f(0, 0, 1)
+        beyond_diffuse = int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Transmission)
+        if not self.base.flags() & beyond_diffuse:
+            return mi.unpolarized_spectrum(self.base.eval_diffuse_reflectance(upright, active))
 
         def reflected(ctx, si, sample1, sample2, active):
             bs, weight = self.base.sample(ctx, si, sample1, sample2, active)

@@ -28,7 +28,7 @@ def lift(w, beta_x, beta_y):
 
 def inclination(w):
     """(sine, cosine) of the angle between ``w`` and the normal, safe at normal and at grazing incidence."""
-    return dr.sqrt(w.x * w.x + w.y * w.y + 1e-14), dr.maximum(w.z, GRAZING / 2)
+    return dr.sqrt(w.x * w.x + w.y * w.y + 1e-14), w.z
 
 
 def silhouette(sin, cos, h):
