@@ -58,7 +58,7 @@ def bare(material, size: int, spp: int) -> dict:
 
 def scenes(size: int, spp: int) -> dict:
     return {
-        "bare": lambda material: bare(material, size, spp),
+        "bare": lambda material: bare(material, size, 4 * spp),
         "preview": lambda material: preview(material, size=(size, size), spp=spp),
     }
 
