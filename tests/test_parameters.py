@@ -2,8 +2,8 @@ import asperity  # noqa: F401  isort: skip
 import mitsuba as mi
 import pytest
 
+from asperity.conductors import artist_friendly, materials
 from asperity.models import MODELS
-from asperity.parameters import artist_friendly, materials
 
 
 def bitmap(low, high):

@@ -34,6 +34,11 @@ def test_works_in_a_fresh_process_without_a_variant(command):
     assert "icrograin" in result.stdout
 
 
+def test_show_tells_of_presets_and_textures(asperity):
+    assert '"type": "micrograin"' in asperity("show", "gilded").output
+    assert "softness" in asperity("show", "settled").output
+
+
 def test_list_names_every_preset(asperity):
     from asperity.scenes import presets
 

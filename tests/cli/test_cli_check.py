@@ -18,3 +18,8 @@ def test_a_material_file(asperity, tmp_path):
     result = asperity("check", "--material", "gold.json", "--set", "material=Ag")
     assert result.exit_code == 0, result.output
     assert "skipped" in result.output
+
+
+def test_one_check_only(asperity):
+    result = asperity("check", "diffuse", "--only", "determinism")
+    assert result.exit_code == 0 and "determinism" in result.output and "furnace" not in result.output

@@ -9,11 +9,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ...conductors import Conductor
 from ...errors import ParameterError
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import conductor
 from ...microfacet.quadrature import gauss_legendre
-from ...parameters import BSDF, Choice, Colour, Conductor, Declared, Flag, Ior, Texture
+from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture
 from . import smith
 from .compensation import LossTable, lobe
 from .diffuse import lambertian
