@@ -12,8 +12,9 @@ from rich.table import Table
 from rich.text import Text
 
 from asperity.errors import ParameterError, UnknownNameError
+from asperity.files import atomically
 
-from . import console, materials, output, variants
+from . import console, materials, variants
 
 VERDICT = {True: ("passed", "green"), False: ("failed", "bold red"), None: ("skipped", "dim")}
 
@@ -73,6 +74,6 @@ def draw(failures: list[Any], name: str, folder: Path) -> None:
             folder.mkdir(parents=True, exist_ok=True)
             slug = re.sub(r"\W+", "-", unicodedata.normalize("NFKD", result.name))  # chi², with a plain 2
             path = folder / f"{name}-{slug}.png"
-            with output.atomically(path) as part:
+            with atomically(path) as part:
                 pictures.draw(result, part)
             typer.echo(path)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
 
 from asperity.errors import ParameterError
+from asperity.files import atomically
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,17 +32,6 @@ def targets(out: Path) -> list[Path]:
             f"-o {out}: cannot write into the folder {str(out.parent)!r}: {error.strerror}."
         ) from error
     return [out] if out.suffix else [out.with_suffix(suffix) for suffix in FORMATS]
-
-
-@contextmanager
-def atomically(path: Path) -> Iterator[Path]:
-    """A file beside ``path`` to write to, which takes its place in the end, or vanishes."""
-    part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
-    try:
-        yield part
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def write(path: Path, image: np.ndarray, names: list[str]) -> None:

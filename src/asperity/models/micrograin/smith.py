@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import drjit as dr
 
+from ...microfacet.ggx import sample_visible_normal as sample_visible_normal
 from ...microfacet.numerics import one_minus_exp
 from ...microfacet.quadrature import integrate
 from .grains import exposure, visible_fraction
-from .shadows import GRAZING, inclination, silhouette
+from .shadows import inclination, silhouette
 
 HEIGHTS = 12
 TINY = 1e-7
@@ -48,15 +49,6 @@ def grain_weight(r, i, o):
 def pore_weight(r, i, o):
     """1 - w+(i, o) = (1 - tau_i) (1 - tau_o) / (1 - tau_0)."""
     return (1 - visible_fraction(r, i)) * (1 - visible_fraction(r, o)) * dr.exp(dr.pi * r)
-
-
-def sample_visible_normal(w, u, v):
-    """Visible normal of GGX in sphere space, w' = ``w`` (Dupuy and Benyoub 2023): a cap of the sphere, reflected."""
-    z = dr.fma(1 - u, 1 + w.z, -w.z)
-    radius = dr.safe_sqrt((1 - z) * (1 + z))
-    sin, cos = dr.sincos(2 * dr.pi * v)
-    m = type(w)(radius * cos + w.x, radius * sin + w.y, dr.maximum(z + w.z, GRAZING**2))
-    return m * dr.rsqrt(dr.squared_norm(m))
 
 
 def visible_masking(w):

@@ -1,0 +1,14 @@
+"""The virtual goniophotometer: measures the BSDF of any microgeometry by tracing light through it.
+
+>>> measure(Grains(tau_0=0.5), [(30, 0), (60, 0)], orders=1).save("grains.npz")
+"""
+
+from .measure import measure as measure
+from .measurement import Estimate as Estimate
+from .measurement import Measurement as Measurement
+from .measurement import merge as merge
+from .microgeometry import Microgeometry as Microgeometry
+from .microgeometry import Tile as Tile
+from .sensors import Hemisphere as Hemisphere
+from .sensors import Points as Points
+from .sensors import Window as Window

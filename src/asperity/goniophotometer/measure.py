@@ -1,0 +1,150 @@
+"""Runs the instrument: tiles, directions and batches of paths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..errors import ParameterError
+from .measurement import Measurement, check_alike
+from .microgeometry import Microgeometry, Tile
+from .sensors import Hemisphere, Points, Sensor, check_angles, directions
+from .tracer import EXTRA, Settings, trace
+
+BATCH = 2**20
+"""Paths in one kernel launch, at most: they fill any processor, and little memory."""
+PATHS, TILES = 2**22, 32
+ENDLESS = 10_000
+"""Scatterings that stand for all of them; what is left is counted as cut."""
+VISIBLE = (440.0, 520.0, 580.0, 650.0)
+"""nm, in spectral variants, unless others are asked for."""
+
+
+def measure(
+    geometry: Microgeometry,
+    incident: Sequence[tuple[float, float]],
+    *,
+    sensor: Sensor | None = None,
+    orders: int | None = None,
+    apart: int = 1,
+    paths: float = PATHS,
+    tiles: int = TILES,
+    seed: int = 0,
+    wavelengths: Sequence[float] | None = None,
+    before: Measurement | None = None,
+    about: dict[str, Any] | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Measurement:
+    """Measure the BSDF of a microgeometry.
+
+    Parameters
+    ----------
+    incident : directions of incidence, (θ, φ) in degrees, θ in [0, 90)
+    sensor : a `Hemisphere` (the default), a `Window`, or `Points` for next-event estimation
+    orders : the highest order of scattering that is followed; all of them if None
+    apart : how many orders are counted apart; the last one takes all that follow
+    paths : per direction, shared among the tiles
+    tiles : how many tiles are drawn; the standard error comes from their differences, so at least 2
+    seed : the same seed gives the same result, bit for bit, on any machine of the same kind
+    wavelengths : in nm, as many as the spectral variant has channels
+    before : a measurement of the same thing: its tiles get more paths. (Other seeds, more tiles: see `merge`.)
+    about : what else to note in the result
+    progress(done, total) : called after each batch of paths
+    stop() : asked after each batch; True ends the measurement with what there is
+    """
+    sensor = sensor or Hemisphere()
+    check_angles(incident)
+    _check(incident, orders, apart, paths, tiles, seed)
+    settings = Settings(orders or ENDLESS, min(apart, orders or apart), _wavelengths(wavelengths))
+    result = _empty(geometry, incident, sensor, settings, tiles, seed, about or {})
+    if before is not None:
+        result = _continued(before, result)
+    quota = -(-int(paths) // len(result.labels))
+    goal = result.paths + quota
+    done, total = 0, quota * result.paths.size
+    while done < total:
+        for row, (tile_seed, number) in enumerate(result.labels):
+            if np.all(result.paths[row] >= goal[row]):
+                continue
+            tile = geometry.tile(np.random.default_rng([tile_seed, number]))
+            if isinstance(sensor, Points):
+                _check_facets(tile)
+            for k, wi in enumerate(result.wi):
+                lanes = min(BATCH, int(goal[row, k] - result.paths[row, k]))
+                if lanes <= 0:
+                    continue
+                stream = np.random.SeedSequence([int(tile_seed), int(number), k, int(result.paths[row, k])])
+                result.energy[row, k] += trace(tile, sensor, wi, settings, stream, lanes)
+                result.paths[row, k] += lanes
+                done += lanes
+                progress(done, total)
+                if stop():
+                    return result
+    return result
+
+
+def _empty(geometry, incident, sensor, settings, tiles, seed, about) -> Measurement:
+    """A measurement of no paths."""
+    channels = dr.size_v(mi.UnpolarizedSpectrum)
+    names = [f"{w:g} nm" for w in settings.wavelengths] or ["R", "G", "B"]
+    shape = (tiles, len(incident), settings.orders, sensor.cells + EXTRA, channels)
+    return Measurement(
+        about
+        | {
+            "geometry": geometry.description,
+            "sensor": sensor.describe(),
+            "limit": settings.limit,
+            "orders": settings.orders,
+            "channels": names,
+        },
+        np.array(incident, dtype=float),
+        np.stack([np.full(tiles, seed), np.arange(tiles)], axis=1),
+        np.zeros(shape[:2], dtype=np.int64),
+        np.zeros(shape, dtype=np.uint64),
+    )
+
+
+def _continued(before: Measurement, fresh: Measurement) -> Measurement:
+    """A copy of ``before``, to add to; it must be about the same as ``fresh``."""
+    check_alike(before, fresh, "continuing")
+    return Measurement(before.about, before.incident, before.labels, before.paths.copy(), before.energy.copy())
+
+
+def _check(incident, orders, apart, paths, tiles, seed) -> None:
+    if not incident:
+        raise ParameterError("theta: expected at least one direction of incidence.")
+    for name, value, least in (("orders", orders or 1, 1), ("apart", apart, 1), ("tiles", tiles, 2), ("seed", seed, 0)):
+        if not (isinstance(value, int) and value >= least):
+            raise ParameterError(f"{name} = {value!r}: expected a whole number, at least {least}.")
+    if not (np.isfinite(paths) and tiles <= paths <= 1e13):
+        raise ParameterError(f"paths = {paths:g}: expected a number in [{tiles}, 1e13], one a tile at least.")
+
+
+def _wavelengths(given: Sequence[float] | None) -> tuple[float, ...]:
+    """The wavelengths of the channels; none in RGB."""
+    if not dr.is_jit_v(mi.Float):
+        raise ParameterError(f"variant {mi.variant()}: the goniophotometer traces arrays; use llvm_ad_rgb, say.")
+    if not mi.is_spectral:
+        if given is not None:
+            raise ParameterError(f"wavelengths: variant {mi.variant()} has none; use llvm_ad_spectral, say.")
+        return ()
+    chosen = tuple(float(w) for w in given or VISIBLE)
+    channels = dr.size_v(mi.UnpolarizedSpectrum)
+    if len(chosen) != channels or not all(360 <= w <= 830 for w in chosen):
+        raise ParameterError(f"wavelengths = {chosen}: expected {channels} of them, in [360, 830] nm.")
+    return chosen
+
+
+def _check_facets(tile: Tile) -> None:
+    """Light cannot be sent from mirrors to given directions."""
+    for shape in tile.scene.shapes():
+        if int(shape.bsdf().flags()) & int(mi.BSDFFlags.Delta):
+            raise ParameterError(
+                f"points: the facets of {shape.id()!r} are mirrors ({shape.bsdf().class_name()}), which no light leaves "
+                "in exactly these directions. Use a hemisphere or a window."
+            )

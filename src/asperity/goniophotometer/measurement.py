@@ -1,0 +1,180 @@
+"""What was measured, with standard errors; kept in files, continued and merged."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError, UnreadableFileError, readable
+from ..files import atomically
+from . import sensors
+from .tracer import BELOW, CUT, ELSEWHERE, UNIT
+
+FORMATS = (".npz",)
+
+
+class Estimate(NamedTuple):
+    """Values and their standard errors, of the same shape."""
+
+    value: np.ndarray
+    error: np.ndarray
+
+
+def estimate(sums: np.ndarray, paths: np.ndarray) -> Estimate:
+    """Mean per path, and its standard error, from sums over the paths of each tile (axis 0).
+
+    The error is that of a ratio estimator over tiles: it holds the noise of the paths and the randomness of the tiles,
+    and has one degree of freedom less than there are tiles.
+    """
+    paths = paths.reshape(paths.shape + (1,) * (sums.ndim - paths.ndim))
+    tiles, total = len(sums), paths.sum(axis=0)
+    mean = sums.sum(axis=0) / np.maximum(total, 1)
+    spread = np.square(sums - paths * mean).sum(axis=0) * tiles / max(tiles - 1, 1)
+    return Estimate(mean, np.sqrt(spread) / np.maximum(total, 1))
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Light counted by tile, direction of incidence, order of scattering, cell and channel.
+
+    ``about`` says of what and how: the microgeometry, the sensor, the limits. Two measurements that are about the same
+    may be merged.
+    """
+
+    about: dict[str, Any]
+    incident: np.ndarray  # (directions, 2): θ and φ in degrees
+    labels: np.ndarray  # (tiles, 2): seed and number
+    paths: np.ndarray  # (tiles, directions)
+    energy: np.ndarray  # (tiles, directions, orders, cells + EXTRA, channels), in units
+
+    @cached_property
+    def sensor(self) -> sensors.Sensor:
+        """Where the light was collected."""
+        return sensors.from_description(self.about["sensor"])
+
+    @cached_property
+    def wi(self) -> np.ndarray:
+        """Directions of incidence (directions, 3)."""
+        return sensors.directions(self.incident)
+
+    @property
+    def orders(self) -> int:
+        """How many orders were counted apart; the last holds all that follow, up to the limit."""
+        return self.energy.shape[2]
+
+    @property
+    def total_paths(self) -> int:
+        """Over all directions."""
+        return int(self.paths.sum())
+
+    @cached_property
+    def values(self) -> Estimate:
+        """f |cos θo|, 1/sr, its mean over each cell: (directions, orders, cells, channels)."""
+        return self._estimate(self._cells, self.sensor.solid_angle)
+
+    @cached_property
+    def summed(self) -> Estimate:
+        """`values` of all orders together: (directions, cells, channels)."""
+        return self._estimate(self._cells.sum(axis=2), self.sensor.solid_angle)
+
+    @cached_property
+    def albedo(self) -> Estimate:
+        """Directional albedo by order: (directions, orders, channels)."""
+        return self._estimate(self._reflected)
+
+    @cached_property
+    def total_albedo(self) -> Estimate:
+        """Directional albedo of all orders together: (directions, channels)."""
+        return self._estimate(self._reflected.sum(axis=2))
+
+    @cached_property
+    def transmitted(self) -> Estimate:
+        """Share of the light that left downwards: (directions, channels)."""
+        return self._estimate(self._beside(BELOW).sum(axis=2))
+
+    @cached_property
+    def cut(self) -> Estimate:
+        """Share of the light that was not followed beyond the limit of orders: (directions, channels)."""
+        return self._estimate(self._beside(CUT).sum(axis=2))
+
+    @property
+    def _cells(self) -> np.ndarray:
+        return self.energy[..., : self.sensor.cells, :]
+
+    def _beside(self, what: int) -> np.ndarray:
+        return self.energy[..., self.sensor.cells + what, :]
+
+    @property
+    def _reflected(self) -> np.ndarray:
+        """All that left upwards; what is sent to points comes on top of it."""
+        aimed = isinstance(self.sensor, sensors.Points)
+        return self._beside(ELSEWHERE) + (0 if aimed else self._cells.sum(axis=3, dtype=np.uint64))
+
+    def _estimate(self, energy: np.ndarray, solid_angle: float = 1.0) -> Estimate:
+        value, error = estimate(energy * UNIT, self.paths)
+        return Estimate(value / solid_angle, error / solid_angle)
+
+    def save(self, path: str | Path) -> None:
+        """Write a NumPy archive: what is needed to go on, and values, errors and directions for everybody else."""
+        path = Path(path)
+        with atomically(path) as part:
+            np.savez_compressed(
+                part,
+                about=json.dumps(self.about),
+                incident=self.incident,
+                labels=self.labels,
+                paths=self.paths,
+                energy=self.energy,
+                wi=self.wi,
+                wo=np.stack([self.sensor.directions(wi)[:, 0] for wi in self.wi]),
+                values=self.values.value,
+                errors=self.values.error,
+                albedo=self.albedo.value,
+                albedo_errors=self.albedo.error,
+                orders=np.arange(1, self.orders + 1),
+            )
+
+    @staticmethod
+    def load(path: str | Path) -> Measurement:
+        """Read what `save` wrote."""
+        path = readable("measurement", path, FORMATS)
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                raw = {name: file[name] for name in ("incident", "labels", "paths", "energy")}
+                return Measurement(json.loads(str(file["about"])), **raw)
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise UnreadableFileError("measurement", path, FORMATS, f"not written by asperity ({error})") from error
+
+
+def check_alike(one: Measurement, other: Measurement, doing: str) -> None:
+    """Raise ParameterError if two measurements are not about the same."""
+    for name in sorted(one.about.keys() | other.about.keys()):
+        if one.about.get(name) != other.about.get(name):
+            raise ParameterError(f"{doing}: {name} differs: {one.about.get(name)} and {other.about.get(name)}.")
+    if not np.array_equal(one.incident, other.incident):
+        raise ParameterError(
+            f"{doing}: the directions of incidence differ: {one.incident.tolist()} and {other.incident.tolist()}."
+        )
+
+
+def merge(measurements: Sequence[Measurement]) -> Measurement:
+    """All the tiles of several measurements of the same thing with different seeds. It is exact: counts are whole."""
+    first, *others = measurements
+    for other in others:
+        check_alike(first, other, "merging")
+    labels, paths, energy = (
+        np.concatenate([getattr(one, name) for one in measurements]) for name in ("labels", "paths", "energy")
+    )
+    unique, counts = np.unique(labels, axis=0, return_counts=True)
+    if counts.max() > 1:
+        seed = unique[np.argmax(counts)][0]
+        raise ParameterError(f"merging: seed {seed} is there twice, and its paths are the same. Use other seeds.")
+    order = np.lexsort(labels.T[::-1])
+    return Measurement(first.about, first.incident, labels[order], paths[order], energy[order])
