@@ -8,6 +8,7 @@ from asperity.models import MODELS
 
 WHITE = {"type": "diffuse", "reflectance": 0.9}
 GLASS = {"type": "roughdielectric", "alpha": 0.2, "distribution": "ggx"}
+ROUGH = {"type": "roughconductor", "alpha": 0.3, "distribution": "ggx"}
 SHEET = {"type": "mask", "opacity": 0.4, "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse"}}}
 SPREAD = {
     "micrograin": {
@@ -29,7 +30,17 @@ SPREAD = {
         "by normal": {"material": "Au", "variation": "normal", "material_2": "Ag"},
         "multiple": {"scattering": "multiple", "tau_0": 0.5, "base": WHITE, "material": "Au"},
         "multiple diffuse": {"scattering": "multiple", "tau_0": 0.5, "specular": False, "diffuse_reflectance": 0.9},
-    }
+    },
+    "merillou": {
+        "white": {"base": WHITE},
+        "deep": {"material": "Au", "tau_0": 0.6, "beta_x": 0.2, "beta_y": 0.8, "depth": 4.0, "base": ROUGH},
+        "tiles": {"tau_0": 0.9, "beta": 0.5, "depth": 0.2},
+    },
+    "deon": {
+        "white": {"base": WHITE},
+        "dense": {"material": "Au", "tau_0": 0.95, "beta": 2.0},
+        "sparse": {"tau_0": 0.02, "beta_x": 0.2, "beta_y": 0.8, "base": ROUGH},
+    },
 }
 SLOW_TO_DIFFERENTIATE = {"by height", "coated", "diffuse anisotropic", "glass base", "multiple diffuse"}
 """Their derivatives unroll the quadrature: half a minute of compiling each. `asperity check` has no such exception."""

@@ -1,6 +1,6 @@
 """The virtual goniophotometer: measures the BSDF of any microgeometry by tracing light through it.
 
->>> measure(Grains(tau_0=0.5), [(30, 0), (60, 0)], orders=1).save("grains.npz")
+>>> measure(ExplicitGrains(tau_0=0.5), [(30, 0), (60, 0)], orders=1).save("grains.npz")
 """
 
 from .measure import measure as measure

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import ParameterError
 from .measurement import Measurement, check_alike
 from .microgeometry import Microgeometry, Tile
-from .sensors import Hemisphere, Points, Sensor, check_angles, directions
+from .sensors import Hemisphere, Points, Sensor, check_angles
 from .tracer import EXTRA, Settings, trace
 
 BATCH = 2**20

@@ -144,3 +144,10 @@ def to_numpy(value: Any, lanes: int) -> np.ndarray:
     rows = np.array(dr.detach(value), dtype=np.float64)
     rows = np.atleast_2d(rows) if dr.is_jit_v(mi.Float) else rows.reshape(-1, 1)
     return np.broadcast_to(rows, (len(rows), lanes))
+
+
+def cell_means(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """Mean of f |cos θo| over cells (channels, cells), each cell covered by directions ``wo`` (cells, n, 3)."""
+    cells, n, _ = wo.shape
+    value = eval(bsdf, vectors(np.atleast_2d(wi)), vectors(wo.reshape(-1, 3)))
+    return to_numpy(value, cells * n).reshape(-1, cells, n).mean(axis=2)

@@ -3,4 +3,5 @@
 Lucas, Ribardière, Pacanowski and Barla, "A Fully-correlated Anisotropic Micrograin BSDF Model", 2024.
 """
 
+from .microgeometry import ExplicitGrains as ExplicitGrains
 from .model import Micrograin as Micrograin

@@ -8,6 +8,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from ...errors import ParameterError
 from ...goniophotometer.microgeometry import Tile
 
 BLACK = {"type": "diffuse", "reflectance": 0.0}
@@ -16,7 +17,7 @@ COHERENT = 4096
 
 
 @dataclass(frozen=True)
-class Grains:
+class ExplicitGrains:
     """Half-ellipsoids of semi-axes 1/beta_x, 1/beta_y, 1 that cover the share ``tau_0`` of a plane; they may overlap.
 
     ``grain`` and ``base`` are descriptions of BSDFs; ``grains`` is the mean number of grains in a tile.
@@ -29,6 +30,37 @@ class Grains:
     base: dict[str, Any] = field(default_factory=lambda: BLACK)
     grains: int = 4096
 
+    def __post_init__(self):
+        for name in ("tau_0", "beta_x", "beta_y"):
+            value = getattr(self, name)
+            if not isinstance(value, int | float):
+                raise ParameterError(f"{name} = {value!r}: simulated grains are alike everywhere; expected one number.")
+        if not 0 <= self.tau_0 < 1:
+            raise ParameterError(f"tau_0 = {self.tau_0:g}: simulated grains cover [0, 1) of the base; 1 needs endless many.")
+        if not (self.beta_x > 0 and self.beta_y > 0):
+            raise ParameterError(f"beta_x = {self.beta_x:g}, beta_y = {self.beta_y:g}: expected numbers above 0.")
+        if not 1 <= self.grains <= 1e8:
+            raise ParameterError(f"grains = {self.grains}: expected a number in [1, 1e8].")
+
+    @classmethod
+    def of(cls, model: dict[str, Any], given: set[str]) -> ExplicitGrains:
+        """The grains that a ``micrograin`` BSDF models; of its parameters the scene has ``given`` some itself.
+
+        Coated grains are Mitsuba's ``plastic``: with the inner reflections that the model neglects.
+        """
+        for name in ("variation", "reflectivity", "edge_tint"):
+            if name in given and model[name] != "none":
+                raise ParameterError(f"{name}: not simulated; facets have one colour, by material, eta and k, or albedo.")
+        coat, metal = {"int_ior", "ext_ior"} & given, {"material", "eta", "k"} & given
+        if not model["specular"]:
+            grain = {"type": "diffuse", "reflectance": model["diffuse_reflectance"]}
+        elif coat or "diffuse_reflectance" in given:
+            grain = {"type": "plastic"} | {name: model[name] for name in ("int_ior", "ext_ior", "diffuse_reflectance")}
+        else:
+            grain = {"type": "conductor"} | ({name: model[name] for name in metal} or {"material": "none"})
+        betas = (model[name] if name in given else model["beta"] for name in ("beta_x", "beta_y"))
+        return cls(model["tau_0"], *betas, grain, model["base"] or BLACK)
+
     @property
     def description(self) -> dict[str, Any]:
         """All of it."""
@@ -37,7 +69,7 @@ class Grains:
     def tile(self, rng: np.random.Generator) -> Tile:
         """A tile as large as it must be for its number of grains."""
         stretch = np.array([1 / self.beta_x, 1 / self.beta_y])
-        side = np.sqrt(self.grains * np.pi / -np.log1p(-self.tau_0))  # in sphere space
+        side = np.sqrt(self.grains * np.pi / max(-np.log1p(-self.tau_0), 1e-9))  # in sphere space
         centres = rng.uniform(-side / 2, side / 2, (rng.poisson(self.grains), 2))
         centres = np.concatenate([centres + shift for shift in _neighbours(side)])
         centres = centres[np.all(np.abs(centres) < side / 2 + 1, axis=1)]

@@ -19,6 +19,7 @@ from . import smith
 from .compensation import LossTable, lobe
 from .diffuse import lambertian
 from .grains import density, exposure, normal_in_sphere_space, sample_visible_normal, visible_fraction
+from .microgeometry import ExplicitGrains
 from .shadows import Shadows, lift, shadow, to_sphere
 
 CITATION = """\
@@ -108,6 +109,12 @@ class Micrograin(Declared):
         "multiple returns what single scattering loses; beta is constant then", options=("single", "multiple")
     )
     base = BSDF("what the grains lie on; black if none")
+
+    @classmethod
+    def microgeometry(cls, description: dict[str, Any]) -> ExplicitGrains:
+        """The explicit grains that a scene's description of this BSDF stands for."""
+        mi.load_dict(description, parallel=False)  # complains of what is wrong with it
+        return ExplicitGrains.of({one.name: one.default for one in cls.declarations()} | description, set(description))
 
     def configure(self, given: set[str]) -> None:
         """Settle what the grains are made of, and their axes; forget what is not used."""

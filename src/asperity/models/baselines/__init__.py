@@ -1,0 +1,1 @@
+"""Published competitors of the micrograin model, for comparison: rough metal with pores, by other microgeometries."""

@@ -1,0 +1,119 @@
+"""What a validation says: findings with bounds, tables and pictures, as a Markdown report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy import stats
+
+from ..files import atomically
+from ..goniophotometer import Estimate
+
+SIGNIFICANCE = 0.01
+"""Probability that a right model fails one finding, over all the numbers compared in it (Šidák)."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A claim and what was measured. ``passed`` is None for what is reported and not judged."""
+
+    claim: str
+    measured: str
+    bound: str = ""
+    passed: bool | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; cells are words or numbers."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a report."""
+
+    title: str
+    text: str
+    findings: Sequence[Finding] = ()
+    tables: Sequence[Table] = ()
+    figures: dict[str, Figure] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long to measure: paths per direction, and tiles, which give the standard error."""
+
+    paths: float
+    tiles: int
+    seed: int = 0
+
+
+def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float) -> Finding:
+    """Whether all numbers of a model lie within the truth's standard errors, and a relative ``tolerance`` of its own.
+
+    Standard errors come from ``tiles`` tiles, so deviations follow Student's t with one degree of freedom less.
+    Numbers that were measured to worse than a tenth are too few hits for that: they are compared as one, by their sum.
+    """
+    value, error, model = (np.ravel(a).astype(float) for a in (*truth, np.broadcast_to(model, truth.value.shape)))
+    good = error < 0.1 * np.abs(value)
+    if not good.any():
+        raise ValueError(f"{claim}: nothing was measured to a tenth; more paths are needed")
+    gap = np.maximum(np.abs(value - model) - tolerance * np.abs(model), 0)[good]
+    limit = float(stats.t.isf((1 - (1 - SIGNIFICANCE) ** (1 / good.sum())) / 2, tiles - 1))
+    worst = float(np.max(gap / error[good]))
+    # Errors of cells are all but independent; if they were not, their sum's would be at most the sum of theirs.
+    rest = abs(value[~good].sum() - model[~good].sum()) - tolerance * model[~good].sum()
+    rest_limit = limit * np.sqrt(np.square(error[~good]).sum()) + 1e-4 * model.sum()
+    mean = np.average(np.abs(value - model)[good] / np.abs(model[good]), weights=model[good])
+    return Finding(
+        claim,
+        f"mean error {mean:.2%} in {good.sum()} numbers; worst {worst:.1f} standard errors",
+        f"{limit:.1f} standard errors beyond {tolerance:.1%}",
+        bool(worst <= limit and rest <= rest_limit),
+    )
+
+
+def passed(sections: Iterable[Section]) -> bool:
+    """Whether no finding failed."""
+    return all(finding.passed is not False for section in sections for finding in section.findings)
+
+
+def write(title: str, preface: str, sections: Sequence[Section], folder: Path) -> Path:
+    """Write ``report.md`` and its pictures into ``folder``; return the report's path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = [f"# {title}", preface]
+    for section in sections:
+        lines += [f"## {section.title}", section.text]
+        if section.findings:
+            rows = [(f.claim, f.measured, f.bound, _verdict(f.passed)) for f in section.findings]
+            lines.append(_markdown(Table(("claim", "measured", "bound", ""), rows)))
+        lines += [_markdown(table) for table in section.tables]
+        for name, figure in section.figures.items():
+            with atomically(folder / f"{name}.png") as part:
+                figure.savefig(part, format="png")
+            lines.append(f"![{name}]({name}.png)")
+    report = folder / "report.md"
+    with atomically(report) as part:
+        part.write_text("\n\n".join(lines) + "\n", encoding="utf-8")
+    return report
+
+
+def _verdict(passed: bool | None) -> str:
+    return {True: "passed", False: "**failed**", None: ""}[passed]
+
+
+def _markdown(table: Table) -> str:
+    rows = [table.head, ["---"] * len(table.head), *table.rows]
+    return "\n".join("| " + " | ".join(map(_cell, row)) + " |" for row in rows)
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
