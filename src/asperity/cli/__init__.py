@@ -9,7 +9,7 @@ import typer
 
 from asperity import __version__
 
-from . import check, cite, doctor, list, render, show
+from . import check, cite, doctor, list, measure, merge, plot, render, show, validate
 from .errors import OneLineErrors
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -18,6 +18,10 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "show": show.show,
     "cite": cite.cite,
     "check": check.check,
+    "measure": measure.measure,
+    "plot": plot.plot,
+    "merge": merge.merge,
+    "validate": validate.validate,
     "doctor": doctor.doctor,
 }
 """In the order of the help."""

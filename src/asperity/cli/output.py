@@ -24,14 +24,31 @@ def targets(out: Path) -> list[Path]:
         raise ParameterError(
             f"-o {out}: the ending is {out.suffix!r}. Allowed: {', '.join(FORMATS)}, or none for both."
         )
+    check_folder(out, "-o")
+    return [out] if out.suffix else [out.with_suffix(suffix) for suffix in FORMATS]
+
+
+def writable(out: Path, formats: tuple[str, ...], option: str = "-o") -> Path:
+    """The file to write, with the first of the endings if it has none; raises if that cannot work."""
+    if not out.suffix and out.name:
+        out = out.with_suffix(formats[0])
+    if out.is_dir():
+        raise ParameterError(f"{option} {out}: it is a folder.")
+    if out.suffix.lower() not in formats:
+        raise ParameterError(f"{option} {out}: the ending is {out.suffix!r}. Allowed: {', '.join(formats)}.")
+    check_folder(out, option)
+    return out
+
+
+def check_folder(out: Path, option: str) -> None:
+    """Raise ParameterError if nothing can be written beside ``out``."""
     try:
         with TemporaryFile(dir=out.parent):
             pass
     except OSError as error:
         raise ParameterError(
-            f"-o {out}: cannot write into the folder {str(out.parent)!r}: {error.strerror}."
+            f"{option} {out}: cannot write into the folder {str(out.parent)!r}: {error.strerror}."
         ) from error
-    return [out] if out.suffix else [out.with_suffix(suffix) for suffix in FORMATS]
 
 
 def write(path: Path, image: np.ndarray, names: list[str]) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -78,14 +79,16 @@ def measure_masking(
     for angles in pairs:
         check_angles(angles)
     if overhangs := getattr(geometry, "overhangs", 0):
-        raise ParameterError(f"masking needs a height field, and {overhangs} faces overhang: some of it is out of sight.")
+        raise ParameterError(
+            f"masking needs a height field, and {overhangs} faces overhang: some of it is out of sight."
+        )
     quota = -(-int(points) // tiles) * len(pairs)
     batch = max(BATCH // len(pairs), 1) * len(pairs)  # lanes take the pairs in turn
     counts, parts = [], []
     for number in range(tiles):
         tile = geometry.tile(np.random.default_rng([seed, number]))
         parts = [shape.id() for shape in tile.scene.shapes()]
-        total = 0
+        total: Any = 0
         for done in range(0, quota, batch):
             stream = np.random.SeedSequence([seed, number, done])
             total = total + look(tile, sensor, pairs, stream, min(batch, quota - done))
@@ -120,5 +123,4 @@ def look(tile: Tile, sensor: Sensor, pairs: Sequence, seed: np.random.SeedSequen
 def _ratio(part: np.ndarray, whole: np.ndarray) -> Estimate:
     """A ratio of counts over tiles (axis 0); NaN where there is nothing. None is known better than to one point."""
     value, error = estimate(part.astype(float), whole)
-    total = np.maximum(whole.sum(axis=0), 1)
-    return Estimate(np.where(whole.sum(axis=0) > 0, value, np.nan), np.maximum(error, 1 / total))
+    return Estimate(value, np.maximum(error, 1 / np.maximum(whole.sum(axis=0), 1)))

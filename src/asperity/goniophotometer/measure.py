@@ -91,7 +91,7 @@ def measure(
 def _empty(geometry, incident, sensor, settings, tiles, seed, about) -> Measurement:
     """A measurement of no paths."""
     channels = dr.size_v(mi.UnpolarizedSpectrum)
-    names = [f"{w:g} nm" for w in settings.wavelengths] or ["R", "G", "B"]
+    names = [f"{w:g} nm" for w in settings.wavelengths] or list("RGB" if channels == 3 else "Y")
     shape = (tiles, len(incident), settings.orders, sensor.cells + EXTRA, channels)
     return Measurement(
         about
@@ -118,7 +118,12 @@ def _continued(before: Measurement, fresh: Measurement) -> Measurement:
 def _check(incident, orders, apart, paths, tiles, seed) -> None:
     if not incident:
         raise ParameterError("theta: expected at least one direction of incidence.")
-    for name, value, least in (("orders", orders or 1, 1), ("apart", apart, 1), ("tiles", tiles, 2), ("seed", seed, 0)):
+    for name, value, least in (
+        ("orders", 1 if orders is None else orders, 1),
+        ("apart", apart, 1),
+        ("tiles", tiles, 2),
+        ("seed", seed, 0),
+    ):
         if not (isinstance(value, int) and value >= least):
             raise ParameterError(f"{name} = {value!r}: expected a whole number, at least {least}.")
     if not (np.isfinite(paths) and tiles <= paths <= 1e13):
@@ -131,7 +136,7 @@ def _wavelengths(given: Sequence[float] | None) -> tuple[float, ...]:
         raise ParameterError(f"variant {mi.variant()}: the goniophotometer traces arrays; use llvm_ad_rgb, say.")
     if not mi.is_spectral:
         if given is not None:
-            raise ParameterError(f"wavelengths: variant {mi.variant()} has none; use llvm_ad_spectral, say.")
+            raise ParameterError(f"wavelengths: variant {mi.variant()} has none; use a spectral one.")
         return ()
     chosen = tuple(float(w) for w in given or VISIBLE)
     channels = dr.size_v(mi.UnpolarizedSpectrum)
@@ -145,6 +150,6 @@ def _check_facets(tile: Tile) -> None:
     for shape in tile.scene.shapes():
         if int(shape.bsdf().flags()) & int(mi.BSDFFlags.Delta):
             raise ParameterError(
-                f"points: the facets of {shape.id()!r} are mirrors ({shape.bsdf().class_name()}), which no light leaves "
-                "in exactly these directions. Use a hemisphere or a window."
+                f"points: the facets of {shape.id()!r} are mirrors ({shape.bsdf().class_name()}): no light leaves "
+                "them in exactly these directions. Use a hemisphere or a window."
             )

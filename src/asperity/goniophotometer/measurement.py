@@ -31,13 +31,14 @@ def estimate(sums: np.ndarray, paths: np.ndarray) -> Estimate:
     """Mean per path, and its standard error, from sums over the paths of each tile (axis 0).
 
     The error is that of a ratio estimator over tiles: it holds the noise of the paths and the randomness of the tiles,
-    and has one degree of freedom less than there are tiles.
+    and has one degree of freedom less than there are tiles. NaN where there are no paths, or those of one tile only.
     """
     paths = paths.reshape(paths.shape + (1,) * (sums.ndim - paths.ndim))
-    tiles, total = len(sums), paths.sum(axis=0)
-    mean = sums.sum(axis=0) / np.maximum(total, 1)
-    spread = np.square(sums - paths * mean).sum(axis=0) * tiles / max(tiles - 1, 1)
-    return Estimate(mean, np.sqrt(spread) / np.maximum(total, 1))
+    tiles, total = np.count_nonzero(paths, axis=0), paths.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = sums.sum(axis=0) / total
+        spread = np.square(sums - paths * mean).sum(axis=0) * (tiles / (tiles - 1))
+        return Estimate(mean, np.sqrt(spread) / total)
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,12 @@ class Measurement:
     def wi(self) -> np.ndarray:
         """Directions of incidence (directions, 3)."""
         return sensors.directions(self.incident)
+
+    @property
+    def wavelengths(self) -> list[float] | None:
+        """In nm, of the channels; None in RGB."""
+        names = self.about["channels"]
+        return [float(name.split()[0]) for name in names] if "nm" in names[0] else None
 
     @property
     def orders(self) -> int:
@@ -149,7 +156,7 @@ class Measurement:
             with np.load(path, allow_pickle=False) as file:
                 raw = {name: file[name] for name in ("incident", "labels", "paths", "energy")}
                 return Measurement(json.loads(str(file["about"])), **raw)
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
             raise UnreadableFileError("measurement", path, FORMATS, f"not written by asperity ({error})") from error
 
 

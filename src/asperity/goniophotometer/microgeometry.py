@@ -23,18 +23,13 @@ class Tile(NamedTuple):
 
 
 class Microgeometry(Protocol):
-    """A kind of surface, from which tiles are drawn.
+    """A kind of surface, from which tiles are drawn."""
 
-    ``description`` is what identifies it in a file of measurements; numbers, words, lists and dictionaries only.
-    """
-
-    description: dict[str, Any]
+    @property
+    def description(self) -> dict[str, Any]:
+        """What identifies it in a file of measurements; numbers, words, lists and dictionaries only."""
+        ...
 
     def tile(self, rng: np.random.Generator) -> Tile:
         """A tile: one of many, if the surface is random, else always the same."""
         ...
-
-
-def surface(tile: Tile) -> list[str]:
-    """The names of the scene's shapes, in the order in which `masking` counts them as parts."""
-    return [shape.id() for shape in tile.scene.shapes()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
@@ -38,7 +39,8 @@ class Sensor:
 
     def describe(self) -> dict[str, Any]:
         """What `from_description` makes this sensor from."""
-        return {"kind": self.kind} | asdict(self)  # type: ignore[call-overload]  # every sensor is a dataclass
+        fields = asdict(self)  # type: ignore[call-overload]  # every sensor is a dataclass
+        return json.loads(json.dumps({"kind": self.kind} | fields))  # as it comes back from a file: lists, no tuples
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,11 @@ def load(description: dict[str, Any] | mi.BSDF) -> mi.BSDF:
     return bsdf
 
 
-def interaction(wi: mi.Vector3f, lanes: int = 1) -> mi.SurfaceInteraction3f:
+def interaction(wi: mi.Vector3f, lanes: int = 1, wavelengths: Any = None) -> mi.SurfaceInteraction3f:
     """Return a point seen from ``wi``, in a frame equal to the world's, at the middle of the texture.
 
-    In spectral variants every lane gets wavelengths of its own, always the same ones for the same lane: channel k is
+    In spectral variants it has the ``wavelengths`` given, in nm, one a channel. If none are given, every lane gets
+    wavelengths of its own, always the same ones for the same lane: channel k is
     uniform in the k-th part of the visible range, so that two calls can be compared.
     """
     lanes = max(lanes, dr.width(wi.x))
@@ -47,7 +48,9 @@ def interaction(wi: mi.Vector3f, lanes: int = 1) -> mi.SurfaceInteraction3f:
     si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1))
     si.dp_du = [1, 0, 0]
     si.dp_dv = [0, 1, 0]
-    if mi.is_spectral:
+    if mi.is_spectral and wavelengths is not None:
+        si.wavelengths = list(map(float, wavelengths))
+    elif mi.is_spectral:
         lane = dr.arange(mi.UInt32, lanes) if dr.is_jit_v(mi.Float) else 0
         channels = len(si.wavelengths)
         width = (LONGEST - SHORTEST) / channels
@@ -146,8 +149,9 @@ def to_numpy(value: Any, lanes: int) -> np.ndarray:
     return np.broadcast_to(rows, (len(rows), lanes))
 
 
-def cell_means(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    """Mean of f |cos θo| over cells (channels, cells), each cell covered by directions ``wo`` (cells, n, 3)."""
-    cells, n, _ = wo.shape
-    value = eval(bsdf, vectors(np.atleast_2d(wi)), vectors(wo.reshape(-1, 3)))
-    return to_numpy(value, cells * n).reshape(-1, cells, n).mean(axis=2)
+def cell_means(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = None) -> np.ndarray:
+    """Mean of f |cos θo| over cells (channels, *cells), each covered by the directions ``wo`` (*cells, n, 3)."""
+    lanes = wo.size // 3
+    si = interaction(vectors(np.atleast_2d(wi)), lanes, wavelengths)
+    value = mi.unpolarized_spectrum(bsdf.eval(mi.BSDFContext(), si, vectors(wo.reshape(-1, 3))))
+    return to_numpy(value, lanes).reshape(-1, *wo.shape[:-1]).mean(axis=-1)

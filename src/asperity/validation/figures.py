@@ -8,6 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..goniophotometer import Estimate, Hemisphere
+from ..goniophotometer.sensors import Sensor
 
 
 def axes(x: str, y: str, title: str) -> tuple[Figure, Axes]:
@@ -19,12 +20,13 @@ def axes(x: str, y: str, title: str) -> tuple[Figure, Axes]:
     return figure, found
 
 
-def slices(title: str, sensor: Hemisphere, truth: Estimate, models: dict[str, np.ndarray]) -> Figure:
+def slices(title: str, sensor: Sensor, truth: Estimate, models: dict[str, np.ndarray]) -> Figure:
     """The hemisphere as traced and as models have it, and the models' relative errors (Lucas 2024, Fig. 7 to 9).
 
     Rows are directions of incidence (the first is drawn); columns of the pictures are azimuths, their rows cosines.
     Errors are left out where the traced value is not known to a tenth.
     """
+    assert isinstance(sensor, Hemisphere)
     figure = _figure(3.2 * (1 + len(models)), 5.6)
     figure.suptitle(title)
     value, error = truth.value[0], truth.error[0]
@@ -36,7 +38,11 @@ def slices(title: str, sensor: Hemisphere, truth: Estimate, models: dict[str, np
     def show(place, values, name, **options):
         place.set_title(name, fontsize=9)
         return place.imshow(
-            values.reshape(sensor.rows, sensor.columns), extent=extent, aspect="auto", interpolation="nearest", **options
+            values.reshape(sensor.rows, sensor.columns),
+            extent=extent,
+            aspect="auto",
+            interpolation="nearest",
+            **options,
         )
 
     def log(values):
@@ -45,10 +51,24 @@ def slices(title: str, sensor: Hemisphere, truth: Estimate, models: dict[str, np
     for place, name, values in zip(grid[0], ("traced", *models), (value, *(model[0] for model in models.values()))):
         brightness = show(place, log(values), name, cmap="viridis", vmin=np.log10(low), vmax=np.log10(high))
     figure.colorbar(brightness, ax=grid[0], label="log₁₀ f cos θₒ [1/sr]")
-    show(grid[1, 0], np.where(known, error / np.maximum(value, 1e-30), np.nan), "σ / value", cmap="RdGy_r", vmin=-0.2, vmax=0.2)
+    show(
+        grid[1, 0],
+        np.where(known, error / np.maximum(value, 1e-30), np.nan),
+        "σ / value",
+        cmap="RdGy_r",
+        vmin=-0.2,
+        vmax=0.2,
+    )
     for place, model in zip(grid[1, 1:], models.values()):
         relative = np.where(known, model[0] / np.where(known, value, 1) - 1, np.nan)
-        errors = show(place, relative, f"relative error, mean {np.nanmean(np.abs(relative)):.1%}", cmap="RdGy_r", vmin=-0.2, vmax=0.2)
+        errors = show(
+            place,
+            relative,
+            f"relative error, mean {np.nanmean(np.abs(relative)):.1%}",
+            cmap="RdGy_r",
+            vmin=-0.2,
+            vmax=0.2,
+        )
     figure.colorbar(errors, ax=grid[1], label="model / traced - 1")
     for place in grid[1]:
         place.set_xlabel("φₒ [°]")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,8 +14,8 @@ from scipy import stats
 from ..files import atomically
 from ..goniophotometer import Estimate
 
-SIGNIFICANCE = 0.01
-"""Probability that a right model fails one finding, over all the numbers compared in it (Šidák)."""
+SIGNIFICANCE, CLAIMS = 0.01, 32
+"""Probability that a right model fails a report which judges that many claims, over all numbers compared (Šidák)."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,7 @@ class Section:
     figures: dict[str, Figure] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Effort:
+class Effort(NamedTuple):
     """How long to measure: paths per direction, and tiles, which give the standard error."""
 
     paths: float
@@ -67,7 +66,7 @@ def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolera
     if not good.any():
         raise ValueError(f"{claim}: nothing was measured to a tenth; more paths are needed")
     gap = np.maximum(np.abs(value - model) - tolerance * np.abs(model), 0)[good]
-    limit = float(stats.t.isf((1 - (1 - SIGNIFICANCE) ** (1 / good.sum())) / 2, tiles - 1))
+    limit = float(stats.t.isf((1 - (1 - SIGNIFICANCE) ** (1 / (CLAIMS * good.sum()))) / 2, tiles - 1))
     worst = float(np.max(gap / error[good]))
     # Errors of cells are all but independent; if they were not, their sum's would be at most the sum of theirs.
     rest = abs(value[~good].sum() - model[~good].sum()) - tolerance * model[~good].sum()

@@ -36,7 +36,9 @@ class ExplicitGrains:
             if not isinstance(value, int | float):
                 raise ParameterError(f"{name} = {value!r}: simulated grains are alike everywhere; expected one number.")
         if not 0 <= self.tau_0 < 1:
-            raise ParameterError(f"tau_0 = {self.tau_0:g}: simulated grains cover [0, 1) of the base; 1 needs endless many.")
+            raise ParameterError(
+                f"tau_0 = {self.tau_0:g}: simulated grains cover [0, 1) of the base; 1 needs endless many."
+            )
         if not (self.beta_x > 0 and self.beta_y > 0):
             raise ParameterError(f"beta_x = {self.beta_x:g}, beta_y = {self.beta_y:g}: expected numbers above 0.")
         if not 1 <= self.grains <= 1e8:
@@ -50,7 +52,9 @@ class ExplicitGrains:
         """
         for name in ("variation", "reflectivity", "edge_tint"):
             if name in given and model[name] != "none":
-                raise ParameterError(f"{name}: not simulated; facets have one colour, by material, eta and k, or albedo.")
+                raise ParameterError(
+                    f"{name}: not simulated; facets have one colour, by material, eta and k, or albedo."
+                )
         coat, metal = {"int_ior", "ext_ior"} & given, {"material", "eta", "k"} & given
         if not model["specular"]:
             grain = {"type": "diffuse", "reflectance": model["diffuse_reflectance"]}
@@ -58,23 +62,31 @@ class ExplicitGrains:
             grain = {"type": "plastic"} | {name: model[name] for name in ("int_ior", "ext_ior", "diffuse_reflectance")}
         else:
             grain = {"type": "conductor"} | ({name: model[name] for name in metal} or {"material": "none"})
-        betas = (model[name] if name in given else model["beta"] for name in ("beta_x", "beta_y"))
-        return cls(model["tau_0"], *betas, grain, model["base"] or BLACK)
+        beta_x, beta_y = (model[name] if name in given else model["beta"] for name in ("beta_x", "beta_y"))
+        return cls(model["tau_0"], beta_x, beta_y, grain, model["base"] or BLACK)
 
     @property
     def description(self) -> dict[str, Any]:
         """All of it."""
         return {"type": "grains"} | asdict(self)
 
-    def tile(self, rng: np.random.Generator) -> Tile:
-        """A tile as large as it must be for its number of grains."""
-        stretch = np.array([1 / self.beta_x, 1 / self.beta_y])
+    @property
+    def size(self) -> np.ndarray:
+        """Width and depth of a tile, as large as it must be for its number of grains."""
         side = np.sqrt(self.grains * np.pi / max(-np.log1p(-self.tau_0), 1e-9))  # in sphere space
-        centres = rng.uniform(-side / 2, side / 2, (rng.poisson(self.grains), 2))
-        centres = np.concatenate([centres + shift for shift in _neighbours(side)])
-        centres = centres[np.all(np.abs(centres) < side / 2 + 1, axis=1)]
+        return side / np.array([self.beta_x, self.beta_y])
+
+    def centres(self, rng: np.random.Generator) -> np.ndarray:
+        """Where grains are (n, 2), with those of neighbouring tiles that reach into this one."""
+        centres = rng.uniform(-0.5, 0.5, (rng.poisson(self.grains), 2))
+        centres = np.concatenate([centres + shift for shift in np.ndindex(3, 3)]) - 1
+        radii = 1 / np.array([self.beta_x, self.beta_y])
+        return (centres * self.size)[np.all(np.abs(centres) * self.size < self.size / 2 + radii, axis=1)]
+
+    def tile(self, rng: np.random.Generator) -> Tile:
+        """A tile with grains of its own."""
+        (width, depth), centres = self.size, self.centres(rng)
         n = len(centres)
-        width, depth = side * stretch
         shapes: dict[str, Any] = {
             "type": "scene",
             "base": {
@@ -86,8 +98,8 @@ class ExplicitGrains:
         if n:
             shapes["grains"] = {
                 "type": "ellipsoids",  # only their upper halves are above the base
-                "centers": _tensor(np.c_[centres * stretch, np.zeros(n)]),
-                "scales": _tensor(np.tile([*stretch, 1], (n, 1))),
+                "centers": _tensor(np.c_[centres, np.zeros(n)]),
+                "scales": _tensor(np.tile([1 / self.beta_x, 1 / self.beta_y, 1], (n, 1))),
                 "quaternions": _tensor(np.tile([0, 0, 0, 1], (n, 1))),
                 "extent": 1.0,
                 "extent_adaptive_clamping": False,
@@ -95,12 +107,6 @@ class ExplicitGrains:
             }
         window = np.sqrt(width * depth * min(1, COHERENT / self.grains))
         return Tile(mi.load_dict(shapes, parallel=False), width, depth, -1e-3, 1 + 1e-3, window)
-
-
-def _neighbours(side: float) -> np.ndarray:
-    """The shifts to a periodic tile's own place and to its eight neighbours'."""
-    steps = np.array([-side, 0, side])
-    return np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 1, 2)
 
 
 def _tensor(values: np.ndarray) -> mi.TensorXf:

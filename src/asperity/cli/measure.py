@@ -1,0 +1,289 @@
+"""``asperity measure``."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Collection
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Table
+
+from asperity.errors import ParameterError, UnknownNameError
+
+from . import console, materials, passes, registry, variants
+from .output import writable
+
+if TYPE_CHECKING:
+    from asperity.goniophotometer import Measurement, Microgeometry
+    from asperity.goniophotometer.sensors import Sensor
+
+FORMATS, TENSORS = (".npz",), (".bsdf",)
+SHAPES = {"mesh": ("bsdf", "periodic"), "heightfield": ("spacing", "scale", "bsdf", "periodic")}
+"""What is read from files, and the options that describe it."""
+SENSORS = {
+    "hemisphere": ("cells",),
+    "retro": ("cells", "radius"),
+    "mirror": ("cells", "radius"),
+    "normal": ("cells", "radius"),
+    "points": ("towards",),
+}
+"""Sensors, and the options that shape them."""
+
+
+def numbers(text: str) -> list[float]:
+    """Numbers from ``30,60``."""
+    try:
+        return [float(number) for number in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"{text!r}: expected numbers, such as 30,60.") from None
+
+
+def angles(text: str) -> list[tuple[float, float]]:
+    """Directions, θ and φ, from ``60:0,30:180``."""
+    pairs = [pair.partition(":")[::2] for pair in text.split(",")]
+    try:
+        return [(float(theta), float(phi)) for theta, phi in pairs]
+    except ValueError:
+        raise typer.BadParameter(f"{text!r}: expected directions theta:phi, such as 60:0,30:180.") from None
+
+
+def counts(text: str) -> list[int]:
+    """One or two numbers of cells from ``32`` or ``32x64``."""
+    try:
+        return [int(count) for count in text.split("x")]
+    except ValueError:
+        raise typer.BadParameter(f"{text!r}: expected 32x64, or 32 for a window.") from None
+
+
+def measure(
+    target: Annotated[str | None, typer.Argument(metavar="WHAT", help="A model; or mesh; or heightfield.")] = None,
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="Of the mesh, or the height field.")] = None,
+    settings: materials.Settings = None,
+    preset: materials.PresetName = None,
+    material: materials.MaterialFile = None,
+    bsdf: Annotated[str | None, typer.Option(metavar="JSON", help="Of the facets of a mesh or height field.")] = None,
+    periodic: Annotated[str | None, typer.Option(help="How a mesh or height field goes on: wrap, or mirror.")] = None,
+    spacing: Annotated[float | None, typer.Option(help="Between the samples of a height field.")] = None,
+    scale: Annotated[float | None, typer.Option(help="Of the heights of a height field.")] = None,
+    theta: Annotated[Any, typer.Option(parser=numbers, metavar="DEGREES", help="Of the incident light.")] = "0,30,60",
+    phi: Annotated[Any, typer.Option(parser=numbers, metavar="DEGREES", help="Every theta gets every phi.")] = "0",
+    orders: Annotated[int | None, typer.Option(min=1, help="Highest order of scattering; all if left out.")] = None,
+    apart: Annotated[int, typer.Option(min=1, help="How many orders are counted apart.")] = 1,
+    paths: Annotated[float, typer.Option(help="Per direction of incidence.")] = 4e6,
+    tiles: Annotated[int | None, typer.Option(min=2, help="How many pieces of surface; 32 if left out.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Another seed, other pieces: see merge.")] = None,
+    sensor: Annotated[str | None, typer.Option(help="hemisphere; retro, mirror or normal (windows); points.")] = None,
+    cells: Annotated[Any, typer.Option(parser=counts, metavar="ROWSxCOLUMNS", help="32x64; 32 for a window.")] = None,
+    radius: Annotated[float | None, typer.Option(help="Half the width of a window, in degrees.")] = None,
+    towards: Annotated[Any, typer.Option(parser=angles, metavar="THETA:PHI,...", help="The points.")] = None,
+    wavelengths: Annotated[Any, typer.Option(parser=numbers, metavar="NM", help="In spectral variants.")] = None,
+    variant: variants.Variant = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="NPZ; named after what is measured if left out.")
+    ] = None,
+    tensor: Annotated[Path | None, typer.Option(metavar="BSDF", help="RGL's tensor file, to write as well.")] = None,
+    before: Annotated[Path | None, typer.Option("--continue", metavar="NPZ", help="Add paths to this file.")] = None,
+) -> None:
+    """Measure the BSDF of a microgeometry with the virtual goniophotometer: f |cos θo| with standard errors.
+
+    `asperity measure micrograin --set tau_0=0.5 --theta 30,60 --orders 1` measures the grains that a model stands for.
+    Ctrl-C stops, and keeps what was measured.
+    """
+    if sum(way is not None for way in (target, preset, material)) != 1:
+        raise ParameterError(f"give one of: the name of a model, {', '.join(SHAPES)}, --preset, --material.")
+    name = preset or (file or material or Path(target or "")).stem
+    out = writable(out or before or Path(f"{name}.npz"), FORMATS)
+    if tensor is not None:
+        tensor = writable(tensor, TENSORS, "--tensor")
+    with console.status("loading"):
+        variants.choose(variant)
+        from asperity import goniophotometer
+
+        shape = {"bsdf": bsdf, "periodic": periodic, "spacing": spacing, "scale": scale}
+        about: dict[str, Any] = {}
+        if target in SHAPES:
+            geometry = from_file(target, file, {**shape, "set": settings or None})
+        else:
+            about["model"] = described(target, preset, material, settings)
+            refuse({"file": file, **shape}, (), name)
+            geometry = of_model(about["model"])
+        chosen = sensor_of(sensor, {"cells": cells, "radius": radius, "towards": towards})
+        earlier = None if before is None else to_continue(before, tiles, seed)
+    incident = list(product(theta, phi))
+    given = {"tiles": tiles, "seed": seed, "wavelengths": wavelengths}
+    start = time.perf_counter()
+    with console.progress("million paths") as progress, passes.interruptible() as interrupted:
+        task = progress.add_task("compiling", total=paths * len(incident) / 1e6)
+
+        def show(done: int, total: int) -> None:
+            rate = f"{done / (time.perf_counter() - start):.2g} paths/s"
+            progress.update(task, completed=round(done / 1e6, 1), total=round(total / 1e6, 1), description=rate)
+
+        measured = goniophotometer.measure(
+            geometry,
+            incident,
+            sensor=chosen,
+            orders=orders,
+            apart=apart,
+            paths=paths,
+            before=earlier,
+            about=about,
+            progress=show,
+            stop=lambda: bool(interrupted),
+            **{option: value for option, value in given.items() if value is not None},
+        )
+    seconds = time.perf_counter() - start
+    measured.save(out)
+    report(measured)
+    rate = (measured.total_paths - (earlier.total_paths if earlier else 0)) / seconds
+    early = "stopped early: " if interrupted else ""
+    typer.echo(f"{early}{out}: {measured.total_paths:.3g} paths, {seconds:.1f} s, {rate:.2g} paths/s")
+    if tensor is not None:
+        from asperity.goniophotometer import tensor_file
+
+        tensor_file.write(measured, tensor)
+        typer.echo(tensor)
+    typer.echo(f"Try next: asperity plot {out}")
+
+
+def refuse(options: dict[str, Any], allowed: Collection[str], what: str) -> None:
+    """Raise if an option is given that would be ignored."""
+    for option, value in options.items():
+        if value is not None and option not in allowed:
+            raise ParameterError(f"{option}: makes no sense with {what}.")
+
+
+def described(
+    target: str | None, preset: str | None, material: Path | None, settings: list[str] | None
+) -> dict[str, Any]:
+    """The description of the model that was asked for, checked."""
+    if target is None:
+        description = materials.chosen(preset, material, settings).material
+    else:
+        if target not in registry.models():  # nor is it a shape
+            raise UnknownNameError("microgeometry", target, [*with_microgeometry(), *SHAPES])
+        description = {"type": target}
+        materials.apply(description, settings or [])
+    materials.check_material(description)
+    return description
+
+
+def with_microgeometry() -> list[str]:
+    """Names of the models that have one."""
+    return [name for name, model in registry.models().items() if hasattr(model, "microgeometry")]
+
+
+def of_model(description: dict[str, Any]) -> Microgeometry:
+    """The microgeometry that a model stands for."""
+    name = description["type"]
+    if name not in with_microgeometry():
+        raise ParameterError(
+            f"{name!r} has no microgeometry to measure. Those that have: {', '.join(with_microgeometry())}."
+        )
+    geometry = registry.model(name).microgeometry(description)
+    try:
+        json.dumps([description, geometry.description])
+    except TypeError as error:
+        raise ParameterError(f"{name}: a measurement cannot keep its description: {error}.") from error
+    return geometry
+
+
+def from_file(kind: str, file: Path | None, options: dict[str, Any]) -> Microgeometry:
+    """A mesh or a height field."""
+    from asperity.goniophotometer.mesh import HeightField, Mesh
+
+    refuse(options, SHAPES[kind], f"a {kind}")
+    if file is None:
+        raise ParameterError(f"{kind}: expected a file after it.")
+    given = {option: value for option, value in options.items() if value is not None}
+    if "bsdf" in given:
+        given["bsdf"] = facets(given["bsdf"])
+    if kind == "mesh":
+        return Mesh(file, **given)
+    if "spacing" not in given:
+        raise ParameterError("spacing: a height field needs the distance between its samples.")
+    return HeightField.load(file, **given)
+
+
+def facets(text: str) -> dict[str, Any]:
+    """The BSDF in ``text``, checked."""
+    try:
+        description = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ParameterError(f"--bsdf {text}: no JSON; column {error.colno}: {error.msg}.") from error
+    if not (isinstance(description, dict) and "type" in description):
+        raise ParameterError(f'--bsdf {text}: expected an object in braces, such as {{"type": "diffuse"}}.')
+    materials.check_material(description)
+    return description
+
+
+def sensor_of(kind: str | None, options: dict[str, Any]) -> Sensor:
+    """The sensor that the options describe."""
+    from asperity.goniophotometer import Hemisphere, Points, Window
+
+    kind = kind or ("points" if options["towards"] else "hemisphere")
+    if kind not in SENSORS:
+        raise UnknownNameError("sensor", kind, SENSORS)
+    refuse(options, SENSORS[kind], f"sensor {kind}")
+    if kind == "points":
+        if not options["towards"]:
+            raise ParameterError("towards: sensor points needs the directions, such as 60:0,30:180.")
+        return Points(tuple(options["towards"]))
+    cells, form = options["cells"] or [], "ROWSxCOLUMNS" if kind == "hemisphere" else "N"
+    if len(cells) not in (0, 1 + form.count("x")):
+        raise ParameterError(f"cells: sensor {kind} takes {form}.")
+    if kind == "hemisphere":
+        return Hemisphere(*cells)
+    given = {"n": cells[0] if cells else None, "radius": options["radius"]}
+    return Window(kind, **{name: value for name, value in given.items() if value is not None})
+
+
+def to_continue(file: Path, tiles: int | None, seed: int | None) -> Measurement:
+    """The measurement to add to; raises if it has other tiles than those that are asked for."""
+    from asperity.goniophotometer import Measurement
+
+    earlier = Measurement.load(file)
+    for option, value, had in (("tiles", tiles, {len(earlier.labels)}), ("seed", seed, set(earlier.labels[:, 0]))):
+        if value is not None and {value} != had:
+            raise ParameterError(
+                f"{option} = {value}: {file} has {', '.join(map(str, sorted(had)))}. "
+                "Measure other tiles into a file of their own, and merge both by `asperity merge`."
+            )
+    return earlier
+
+
+def report(measured: Measurement) -> None:
+    """Print the table of albedos, a line for each direction of incidence."""
+    import numpy as np
+
+    names = measured.about["channels"]
+    shown = {"albedo": measured.total_albedo}
+    if measured.orders > 1:
+        more = " and more" if measured.about["limit"] > measured.orders else ""
+        for k in range(measured.orders):
+            part = type(measured.albedo)(*(values[:, k] for values in measured.albedo))
+            shown[f"order {k + 1}{more if k == measured.orders - 1 else ''}"] = part
+    shown |= {what: part for what in ("transmitted", "cut") if np.any((part := getattr(measured, what)).value > 0)}
+    differ = np.ptp(measured.energy, axis=-1).any()
+    table = Table("θ [°]", "φ [°]", *(["channel"] if differ else []), *shown)
+    for row, (theta, phi) in enumerate(measured.incident):
+        for channel, name in enumerate(names if differ else names[:1]):
+            values = (with_error(part.value[row, channel], part.error[row, channel]) for part in shown.values())
+            table.add_row(f"{theta:g}", f"{phi:g}", *([name] if differ else []), *values)
+    console.stdout().print(table)
+
+
+def with_error(value: float, error: float) -> str:
+    """A value with as many digits as its standard error, which gets two, deserves."""
+    import numpy as np
+
+    if not np.isfinite(value):
+        return "not measured"
+    if not (np.isfinite(error) and error > 0):
+        return f"{value:.4g} ± {'0' if error == 0 else '?'}"
+    digits = int(np.clip(1 - np.floor(np.log10(error)), 0, 6))
+    return f"{value:.{digits}f} ± {error:.{digits}f}"

@@ -1,0 +1,36 @@
+"""``asperity plot``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from asperity.files import atomically
+
+from . import console, variants
+from .output import writable
+
+FORMATS = (".png", ".pdf", ".svg")
+
+
+def plot(
+    file: Annotated[Path, typer.Argument(metavar="NPZ", help="What `asperity measure` wrote.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="PNG, PDF or SVG; FILE.png if left out.")] = None,
+    model: Annotated[bool, typer.Option(help="Draw the model's own values as well, if it is a model's.")] = True,
+) -> None:
+    """Plot a measurement: maps, their errors, slices through the plane of incidence, and the albedo."""
+    out = writable(out or Path(f"{file.stem}.png"), FORMATS)
+    with console.status("drawing"):
+        from asperity.goniophotometer import Measurement, plots
+
+        measured = Measurement.load(file)
+        description = measured.about.get("model") if model else None
+        if description is not None:
+            nanometres = measured.about["channels"][0].endswith("nm")
+            variants.choose("llvm_ad_spectral" if nanometres else None)
+        figure = plots.draw(measured, description)
+        with atomically(out) as part:
+            figure.savefig(part)
+    typer.echo(out)

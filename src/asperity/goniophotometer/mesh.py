@@ -1,0 +1,426 @@
+"""Surfaces of the user's own: triangle meshes and height fields, made periodic."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import mitsuba as mi
+import numpy as np
+
+from ..errors import ParameterError, UnknownNameError, UnreadableFileError, readable
+from .microgeometry import Tile
+
+MESHES = (".ply", ".obj")
+HEIGHTS = (".npy", ".png", ".exr")
+PERIODIC = ("wrap", "mirror")
+DIFFUSE = {"type": "diffuse"}
+TOLERANCE = 2e-6
+"""Borders match within this share of the largest coordinate: the rounding of two numbers of six digits in a text file,
+and far more than that of two float32."""
+MARGIN = 1e-3
+"""Between the surface and the top and bottom of its tile, as a share of the extent."""
+STEEPEST = 100
+"""Heights may span that many widths of the tile; more is a mistake about units, and too coarse for float32."""
+
+
+class Triangles(NamedTuple):
+    """One period of a surface, or a quarter of one that is mirrored; its bounding box is centred on the origin."""
+
+    vertices: np.ndarray  # (n, 3)
+    faces: np.ndarray  # (m, 3): indices of vertices, counter-clockwise from outside
+    uv: np.ndarray  # (n, 2)
+    size: np.ndarray  # (3,): of the bounding box
+
+
+class Triangulated:
+    """What meshes and height fields have in common: triangles of one BSDF, repeated by ``periodic``."""
+
+    bsdf: dict[str, Any]
+    periodic: str
+    triangles: Triangles
+
+    @cached_property
+    def overhangs(self) -> int:
+        """How many faces do not look up; there are none in a height field."""
+        return int(np.count_nonzero(_normals(*self.triangles[:2])[:, 2] <= 0))
+
+    def tile(self, rng: np.random.Generator) -> Tile:
+        """Always the same tile, built when it is first asked for, of the variant that is then in use.
+
+        It is scaled by a power of two, so that the unit of length cannot matter: its larger side is in [1, 2). In
+        float32 the normals of triangles with edges of 1e-10 would be lost.
+        """
+        return self._tile
+
+    @cached_property
+    def _tile(self) -> Tile:
+        vertices, faces, uv, (width, depth, height) = self.triangles
+        if self.periodic == "mirror":
+            vertices, faces, uv = _mirrored(self.triangles)
+            width, depth = 2 * width, 2 * depth
+        scale = 2.0 ** -np.floor(np.log2(max(width, depth)))
+        vertices, width, depth, height = vertices * scale, width * scale, depth * scale, height * scale
+        properties = mi.Properties()
+        properties["face_normals"] = True
+        properties["bsdf"] = _bsdf(self.bsdf)
+        mesh = mi.Mesh("surface", len(vertices), len(faces), has_vertex_texcoords=True, props=properties)
+        parameters = mi.traverse(mesh)
+        parameters["vertex_positions"] = mi.Float(np.float32(vertices).ravel())
+        parameters["vertex_texcoords"] = mi.Float(np.float32(uv).ravel())
+        parameters["faces"] = mi.UInt32(np.uint32(faces).ravel())
+        parameters.update()
+        # Without robust intersections, a few in a million rays slip through an edge that they meet exactly.
+        robust = {"embree_use_robust_intersections": True}
+        scene = mi.load_dict({"type": "scene", "surface": mesh} | robust, parallel=False)
+        top = height / 2 + MARGIN * max(width, depth, height)
+        return Tile(scene, float(width), float(depth), -float(top), float(top))
+
+    def _check(self) -> None:
+        """Find mistakes early: when a geometry is described, not when light is traced."""
+        if mi.variant() is None:
+            raise ParameterError('variant: none is set. Call mitsuba.set_variant("llvm_ad_rgb"), say, first.')
+        if self.periodic not in PERIODIC:
+            raise UnknownNameError("value of periodic", self.periodic, PERIODIC)
+        _bsdf(self.bsdf)
+        width, depth, height = self.triangles.size
+        if height > STEEPEST * max(width, depth):
+            raise ParameterError(
+                f"heights span {height:g}, and the tile is {width:g} x {depth:g}: expected at most {STEEPEST} times "
+                "the larger side. Are heights and widths in the same unit of length?"
+            )
+
+
+@dataclass(frozen=True)
+class Mesh(Triangulated):
+    """A triangle mesh in a file, .ply or .obj, z up; its bounding box in x and y is one period.
+
+    The mesh must cover its bounding box without holes, once, with faces that are counter-clockwise from above; it may
+    overhang. Faces are flat: normals in the file are ignored, since shading normals break energy.
+
+    Parameters
+    ----------
+    path : the file; any unit of length
+    bsdf : of all facets, as a dictionary for ``mi.load_dict``
+    periodic : ``wrap`` repeats the mesh, whose opposite borders must match; ``mirror`` reflects it at its borders, so
+        that the tile is twice as wide and deep
+
+    Raises ParameterError or UnreadableFileError, which say what is wrong and where; indices count from 0.
+    """
+
+    path: str | Path
+    bsdf: dict[str, Any] = field(default_factory=DIFFUSE.copy)
+    periodic: str = "wrap"
+    kind: ClassVar[str] = "mesh"
+
+    def __post_init__(self):
+        readable("mesh", self.path, MESHES)
+        self._check()
+
+    @cached_property
+    def description(self) -> dict[str, Any]:
+        """The resolved path, the SHA-256 of the file, the BSDF and how the mesh repeats."""
+        return {"type": self.kind, **_content(self.path), "periodic": self.periodic, "bsdf": _plain(self.bsdf)}
+
+    @cached_property
+    def triangles(self) -> Triangles:  # type: ignore[override]
+        """What the file holds, checked; faces without any area are left out."""
+        return _centred(*_read(Path(self.path)), wrapped=self.periodic == "wrap")
+
+
+@dataclass(frozen=True, eq=False)
+class HeightField(Triangulated):
+    """Heights over a grid; rows go along y and columns along x, and each cell of the grid is two triangles.
+
+    Parameters
+    ----------
+    heights : (rows, columns), at least 2 x 2
+    spacing : of columns and rows, (dx, dy), or one number for both; in the unit of the heights
+    bsdf : of all facets, as a dictionary for ``mi.load_dict``; its textures span the given heights once
+    periodic : ``wrap`` joins the last row to the first and the last column to the first, so that the tile is
+        columns · dx x rows · dy; ``mirror`` reflects the field at its outermost rows and columns, so that it is
+        2 (columns - 1) dx x 2 (rows - 1) dy
+    source : where the heights come from, for the description
+
+    Raises ParameterError for what is out of range.
+    """
+
+    heights: np.ndarray
+    spacing: tuple[float, float] | float
+    bsdf: dict[str, Any] = field(default_factory=DIFFUSE.copy)
+    periodic: str = "wrap"
+    source: Any = None
+    kind: ClassVar[str] = "height field"
+
+    def __post_init__(self):
+        object.__setattr__(self, "heights", _heights(self.heights))
+        object.__setattr__(self, "spacing", _spacing(self.spacing))
+        self._check()
+
+    @staticmethod
+    def load(
+        path: str | Path,
+        spacing: tuple[float, float] | float,
+        scale: float = 1.0,
+        bsdf: dict[str, Any] = DIFFUSE,
+        periodic: str = "wrap",
+    ) -> HeightField:
+        """Read heights from an array, .npy, or from the first channel of an image, .png or .exr.
+
+        ``scale`` multiplies what the file holds. In a .png that is 0 to 1, proportional to the stored whole numbers:
+        nothing is taken for sRGB. An image's first row, its upper one, is the row of lowest y.
+        """
+        found = readable("height field", path, HEIGHTS)
+        try:
+            values = np.load(found, allow_pickle=False) if found.suffix.lower() == ".npy" else _image(found)
+        except (OSError, ValueError, RuntimeError) as error:
+            raise UnreadableFileError("height field", found, HEIGHTS, str(error)) from error
+        if not np.isfinite(scale):
+            raise ParameterError(f"scale = {scale}: expected a finite number.")
+        return HeightField(_heights(values) * scale, spacing, bsdf, periodic, _content(found) | {"scale": scale})
+
+    @cached_property
+    def description(self) -> dict[str, Any]:
+        """Shape and SHA-256 of the heights (float64, row by row), spacing, BSDF, how they repeat, and the source."""
+        return {
+            "type": self.kind,
+            "shape": list(self.heights.shape),
+            "sha256": hashlib.sha256(self.heights.tobytes()).hexdigest(),
+            "spacing": _plain(self.spacing),
+            "periodic": self.periodic,
+            "bsdf": _plain(self.bsdf),
+            "source": _plain(self.source),
+        }
+
+    @cached_property
+    def triangles(self) -> Triangles:  # type: ignore[override]
+        """The grid; if it wraps, with the first row and column once more at its end."""
+        z = np.pad(self.heights, (0, 1), mode="wrap") if self.periodic == "wrap" else self.heights
+        rows, columns = z.shape
+        step = np.asarray(self.spacing)
+        size = np.array([*(step * (columns - 1, rows - 1)), np.ptp(z)])
+        u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
+        uv = np.stack([u, v], axis=-1).reshape(-1, 2)
+        vertices = np.c_[(uv - 0.5) * size[:2], z.ravel() - (z.min() + size[2] / 2)]
+        corner = np.arange(rows * columns).reshape(rows, columns)[:-1, :-1].reshape(-1, 1)
+        here, right, back, across = corner, corner + 1, corner + columns, corner + columns + 1
+        return Triangles(vertices, np.c_[here, right, across, here, across, back].reshape(-1, 3), uv, size)
+
+
+def _bsdf(description: dict[str, Any]) -> Any:
+    """The BSDF; Mitsuba's complaints become ours."""
+    try:
+        bsdf = mi.load_dict(description)
+    except Exception as error:  # plugins in Python raise whatever they like
+        raise ParameterError(f"bsdf = {description}: {error}") from error
+    if not isinstance(bsdf, mi.BSDF):
+        raise ParameterError(f"bsdf = {description}: expected a BSDF, and Mitsuba makes a {type(bsdf).__name__} of it.")
+    return bsdf
+
+
+def _plain(value: Any) -> Any:
+    """What JSON makes of a value."""
+    return json.loads(json.dumps(value, default=str))
+
+
+def _content(path: str | Path) -> dict[str, Any]:
+    """What identifies a file."""
+    path = Path(path).resolve()
+    return {"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+
+
+def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Normals (faces, 3), as long as twice the faces' areas."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _mirrored(quarter: Triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices, faces and texture coordinates of a mesh and its reflections, 2 x 2; the seams are the axes, exactly."""
+    inner = quarter.vertices - [*quarter.size[:2] / 2, 0]
+    signs = [(1, 1), (-1, 1), (1, -1), (-1, -1)]
+    vertices = np.concatenate([inner * (x, y, 1) for x, y in signs])
+    # A reflection turns faces upside down, unless they are turned as well.
+    faces = [quarter.faces[:, :: x * y] + k * len(inner) for k, (x, y) in enumerate(signs)]
+    return vertices, np.concatenate(faces), np.tile(quarter.uv, (4, 1))
+
+
+def _heights(values: Any) -> np.ndarray:
+    """A copy of its own of a 2-D array of finite numbers."""
+    try:
+        if np.iscomplexobj(values):
+            raise TypeError("they are complex")
+        heights = np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise ParameterError(f"heights: expected a 2-D array of real numbers ({error}).") from error
+    if heights.ndim != 2 or min(heights.shape) < 2:
+        raise ParameterError(f"heights: expected a 2-D array, at least 2 x 2; its shape is {heights.shape}.")
+    wrong = np.argwhere(~np.isfinite(heights))
+    if len(wrong):
+        row, column = wrong[0]
+        raise ParameterError(
+            f"heights[{row}, {column}] = {heights[row, column]}: expected finite numbers; {len(wrong)} are not."
+        )
+    heights.setflags(write=False)
+    return heights
+
+
+def _spacing(given: Any) -> tuple[float, float]:
+    """Along x and y."""
+    try:
+        dx, dy = (float(x) for x in np.broadcast_to(given, 2))
+    except (TypeError, ValueError) as error:
+        raise ParameterError(f"spacing = {given!r}: expected a number, or two of them, (dx, dy).") from error
+    if not (0 < dx < np.inf and 0 < dy < np.inf):
+        raise ParameterError(f"spacing = {given!r}: expected finite numbers above 0.")
+    return dx, dy
+
+
+def _image(path: Path) -> np.ndarray:
+    """The first channel of an image, as stored; whole numbers are scaled to [0, 1]."""
+    bitmap = mi.Bitmap(str(path))
+    bitmap.set_srgb_gamma(False)
+    values = np.array(bitmap.convert(bitmap.pixel_format(), mi.Struct.Type.Float32, srgb_gamma=False))
+    return values[..., 0] if values.ndim == 3 else values
+
+
+def _read(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Vertices (n, 3), faces (m, 3) and texture coordinates (n, 2), if there are any, of a mesh that has some."""
+    try:
+        mesh = mi.load_dict({"type": path.suffix[1:].lower(), "filename": str(path), "face_normals": True})
+    except RuntimeError as error:
+        raise UnreadableFileError("mesh", path, MESHES, str(error)) from error
+    parameters = mi.traverse(mesh)
+    faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
+    if not len(faces):
+        raise ParameterError(f"mesh {path.name}: it has no faces.")
+    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+    wild = np.flatnonzero(faces.max(axis=1) >= len(vertices))
+    if len(wild):
+        raise ParameterError(
+            f"mesh: face {wild[0]} is of vertices {faces[wild[0]].tolist()}, and there are {len(vertices)}; "
+            f"{len(wild)} such faces."
+        )
+    uv = np.array(parameters["vertex_texcoords"]).reshape(-1, 2) if mesh.has_vertex_texcoords() else None
+    return vertices, faces, uv
+
+
+def _centred(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, wrapped: bool) -> Triangles:
+    """A mesh moved to the middle, if it is a surface that may be repeated."""
+    used, faces = np.unique(faces, return_inverse=True)
+    original, vertices, faces = vertices, vertices[used], faces.reshape(-1, 3)
+    wrong = np.flatnonzero(~np.all(np.isfinite(vertices), axis=1))
+    if len(wrong):
+        raise ParameterError(
+            f"mesh: vertex {used[wrong[0]]} is at {_where(original[used[wrong[0]]])}: expected finite coordinates; "
+            f"{len(wrong)} such vertices."
+        )
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    size = high - low
+    tolerance = TOLERANCE * max(np.abs(vertices).max(), size.max())
+    if min(size[:2]) <= 4 * tolerance:
+        raise ParameterError(
+            f"mesh: it spans {_where(size)} in x, y and z: expected a width and a depth above {4 * tolerance:g}. "
+            "Heights must be along z; many programs export y up."
+        )
+    at_border = np.stack([np.abs(vertices - low) <= tolerance, np.abs(vertices - high) <= tolerance])[..., :2]
+    open_edges, owners = _open_edges(vertices, faces)
+    sides = at_border[:, open_edges].all(axis=2)  # (low or high, edges, x or y)
+    holes = np.flatnonzero(~sides.reshape(2, -1, 2).any(axis=2).any(axis=0))
+    if len(holes):
+        a, b = vertices[open_edges[holes[0]]]
+        raise ParameterError(
+            f"mesh: a hole. Face {owners[holes[0]]} has no neighbour across the edge from {_where(a)} to {_where(b)}, "
+            f"which is not on the tile's border, x = {low[0]:g} or {high[0]:g}, y = {low[1]:g} or {high[1]:g}; "
+            f"{len(holes)} such edges. Fill holes, join edges that meet, and cut the mesh to a rectangle."
+        )
+    _check_cover(vertices, faces, size)
+    if wrapped:
+        _check_borders(vertices, open_edges, sides, tolerance)
+    vertices = vertices - (low + high) / 2
+    vertices[:, :2] = np.where(at_border[0], -size[:2] / 2, np.where(at_border[1], size[:2] / 2, vertices[:, :2]))
+    uv = vertices[:, :2] / size[:2] + 0.5 if uv is None else uv[used]
+    return Triangles(vertices, faces[np.any(_normals(vertices, faces) != 0, axis=-1)], uv, size)
+
+
+def _open_edges(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (n, 2) of only one face, and that face; each other edge must be of two, once in each direction.
+
+    Vertices at the same place count as one: files repeat them along the seams of textures, say.
+    """
+    _, first, place = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    corners = place.reshape(-1)[faces]
+    edges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
+    real = np.repeat(np.all(corners != np.roll(corners, -1, axis=1), axis=1), 3)  # not of faces that are mere lines
+    owners, edges = np.flatnonzero(real) // 3, edges[real]
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    _, edge, counts = np.unique(low * len(first) + high, return_inverse=True, return_counts=True)
+    turns = np.bincount(edge, np.where(edges[:, 0] == low, 1, -1), len(counts))
+    for wrong, what in (
+        (counts > 2, "more than one neighbour"),
+        ((counts == 2) & (turns != 0), "a neighbour of opposite orientation"),
+    ):
+        if wrong.any():
+            k = np.argmax(wrong[edge])
+            a, b = vertices[first[edges[k]]]
+            raise ParameterError(
+                f"mesh: face {owners[k]} has {what} across the edge from {_where(a)} to {_where(b)}; "
+                f"{np.count_nonzero(wrong)} such edges. Expected one surface of faces counter-clockwise from above."
+            )
+    open_ones = counts[edge] == 1
+    return first[edges[open_ones]], owners[open_ones]
+
+
+def _check_cover(vertices: np.ndarray, faces: np.ndarray, size: np.ndarray) -> None:
+    """A surface whose border is that of the tile covers it once: what looks up less what looks down is its area."""
+    cover = _normals(vertices, faces)[:, 2].sum() / 2 / np.prod(size[:2])
+    if cover < -0.5:
+        raise ParameterError(
+            "mesh: it is upside down: its faces are clockwise from above. Flip them, or reverse the order of each "
+            "face's vertices."
+        )
+    if abs(cover - 1) > 1e-3:
+        raise ParameterError(
+            f"mesh: seen from above, its faces cover {cover:g} of its bounding box, {_where(size[:2])}, less "
+            "those that look down: expected 1. A closed body covers 0: leave its bottom and sides away."
+        )
+
+
+def _check_borders(vertices: np.ndarray, edges: np.ndarray, sides: Any, tolerance: float) -> None:
+    """Opposite borders are the same lines."""
+    for axis, name in enumerate("xy"):
+        plane = [1 - axis, 2]
+        low, high = (vertices[edges[side]][..., plane] for side in sides[..., axis])
+        for one, other in ((low, high), (high, low)):
+            points = one.reshape(-1, 2)
+            apart = _distances(points, other)
+            worst = np.argmax(apart)
+            if apart[worst] > tolerance:
+                y, z = points[worst]
+                raise ParameterError(
+                    f"mesh: its borders in {name} do not match. At {'yx'[axis]} = {y:g}, z = {z:g} they are "
+                    f"{apart[worst]:g} apart; {np.count_nonzero(apart > tolerance)} of {len(apart)} ends of the "
+                    f'border\'s edges are more than {tolerance:g} apart. Use periodic="mirror", or mend the mesh.'
+                )
+
+
+def _distances(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
+    """From each of the points (n, 2) to the nearest of the segments (m, 2, 2)."""
+    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    square = np.maximum(np.sum(along**2, axis=1), np.finfo(float).tiny)
+
+    def nearest(some: np.ndarray) -> np.ndarray:
+        to = some[:, None] - start
+        share = np.clip(np.sum(to * along, axis=-1) / square, 0, 1)
+        return np.linalg.norm(to - share[..., None] * along, axis=-1).min(axis=1)
+
+    pieces = np.array_split(points, 1 + len(points) * len(segments) // 2**20)  # never much memory
+    return np.concatenate([nearest(some) for some in pieces if len(some)])
+
+
+def _where(point: np.ndarray) -> str:
+    return "(" + ", ".join(f"{x:g}" for x in point) + ")"

@@ -1,0 +1,262 @@
+"""Meshes and height fields: known answers of flat and white surfaces, one answer for one shape, and mistakes named.
+
+Cells are compared by Student's t with a degree of freedom less than there are tiles, since the standard error itself
+comes from that few numbers; Sidak's correction keeps a false alarm in any of n cells at 1e-3. The tiles of a mesh are
+all the same, so they differ by the noise of the paths alone. Seeds are fixed: what passes once passes always.
+"""
+
+import asperity  # noqa: F401  isort: skip
+import json
+import re
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy import stats
+
+from asperity.errors import AsperityError, UnreadableFileError
+from asperity.goniophotometer import Hemisphere, measure
+from asperity.goniophotometer.mesh import HeightField, Mesh
+from asperity.lab import evaluate
+
+TILES = 16
+MIRROR = {"type": "conductor", "material": "none"}
+WHITE = {"type": "diffuse", "reflectance": 1.0}
+ROUGH = {"type": "roughconductor", "material": "none", "alpha": 0.4, "sample_visible": False}
+COARSE = Hemisphere(6, 8)
+FLAT = np.zeros((3, 5))
+SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+HALVES = [(0, 1, 2), (0, 2, 3)]
+
+
+def waves(n=48, slope=1.5):
+    """Heights of a sum of sines over a period of 1, of that root mean square slope."""
+    x, y = np.meshgrid(*[np.arange(n) / n * 2 * np.pi] * 2)
+    z = np.sin(2 * x + y) + 0.7 * np.sin(3 * y - x) + 0.5 * np.cos(4 * x)
+    return z * slope / np.sqrt(np.square(np.gradient(z, 1 / n)).sum(axis=0).mean())
+
+
+def write(path, vertices, faces):
+    """A mesh in a file, .ply (binary) or .obj."""
+    if path.suffix == ".obj":
+        lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
+        path.write_text("\n".join([*lines, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces)]) + "\n")
+        return path
+    corner = [("n", "u1"), ("v", "<i4", 3)]
+    head = f"""ply
+format binary_little_endian 1.0
+element vertex {len(vertices)}
+property float x
+property float y
+property float z
+element face {len(faces)}
+property list uchar int vertex_indices
+end_header
+"""
+    rows = np.array([(3, face) for face in faces], dtype=corner)
+    path.write_bytes(head.encode() + np.array(vertices, "<f4").tobytes() + rows.tobytes())
+    return path
+
+
+def grid(path, heights, shift=(0, 0, 0)):
+    """The heights as a mesh of unit width and depth, in a file."""
+    shape = HeightField(heights, 1 / (np.array(heights.shape[::-1]) - 1), periodic="mirror").triangles
+    return write(path, shape.vertices + shift, shape.faces)
+
+
+def closed(heights):
+    """With the first row and column once more at the end."""
+    return np.pad(heights, (0, 1), mode="wrap")
+
+
+def run(geometry, *incident, paths=2**15, sensor=COARSE, **how):
+    return measure(geometry, incident or [(50, 20)], paths=paths, tiles=TILES, sensor=sensor, **how)
+
+
+def agrees(value, expected, error):
+    """Whether all of the values are within their errors; one that never varied must be right to float32."""
+    limit = stats.t.ppf(1 - (1 - (1 - 1e-3) ** (1 / np.size(value))) / 2, TILES - 1)
+    return np.all(np.abs(value - expected) <= limit * error + 1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
+@pytest.mark.parametrize("theta", [0, 50, 89])
+def test_a_flat_mirror_sends_all_light_one_way(rgb, theta, size):
+    result = run(HeightField(FLAT, size, MIRROR), (theta, 20), paths=4096)
+    there = COARSE.axes(result.wi[0]) @ (result.wi[0] * (-1, -1, 1))
+    cell, _ = COARSE.locate(mi.Vector3f(*map(float, there)))
+    expected = np.zeros((COARSE.cells, 3))
+    expected[int(cell[0])] = 1 / COARSE.solid_angle
+    assert np.allclose(result.summed.value[0], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("periodic", ["wrap", "mirror"])
+@pytest.mark.parametrize("bsdf", [{"type": "diffuse", "reflectance": 0.6}, ROUGH], ids=["diffuse", "rough conductor"])
+def test_a_flat_plane_is_its_bsdf(rgb, bsdf, periodic):
+    """In every cell that 50 paths or more should reach: fewer are too skewed for Student's t."""
+    result = run(HeightField(FLAT, (1, 2), bsdf, periodic), paths=2**17)
+    value, error = result.summed
+    wo = COARSE.directions(result.wi[0], 16)
+    expected = evaluate.cell_means(evaluate.load(bsdf), result.wi[0], wo).T
+    if bsdf["type"] == "diffuse":
+        assert np.allclose(expected, 0.6 / np.pi * wo[..., 2].mean(axis=1)[:, None], rtol=1e-4)
+    reached = expected[:, 0] * COARSE.solid_angle * 2**17 > 50
+    assert reached.sum() > 30 and agrees(value[0, reached, 0], expected[reached, 0], error[0, reached, 0])
+
+
+@pytest.mark.parametrize("periodic", ["wrap", "mirror"])
+@pytest.mark.parametrize("bsdf", [WHITE, MIRROR], ids=["diffuse", "mirror"])
+def test_nothing_is_lost_in_a_white_furnace(rgb, bsdf, periodic):
+    result = run(HeightField(waves(), 1 / 48, bsdf, periodic), (5, 0), (60, 20), (89, 40))
+    assert agrees(result.total_albedo.value, 1, result.total_albedo.error)
+    assert not result.transmitted.value.any() and not result.cut.value.any()
+
+
+def test_no_light_slips_through_edges(rgb):
+    """Rays along x meet the edges of rows exactly; five in 2^20 came through without robust intersections."""
+    field = HeightField(waves(512), 1 / 512, MIRROR)
+    assert run(field, (5, 0), paths=2**20, orders=1).transmitted.value.max() == 0
+
+
+@pytest.mark.parametrize("ending", [".ply", ".obj"])
+@pytest.mark.parametrize("periodic", ["wrap", "mirror"])
+def test_a_mesh_equals_its_height_field(rgb, tmp_path, ending, periodic):
+    heights = waves(24) if periodic == "wrap" else waves(24)[:15, :9]
+    spacing = 1 / 24 if periodic == "wrap" else (1 / 8, 1 / 14)
+    path = grid(tmp_path / f"waves{ending}", closed(heights) if periodic == "wrap" else heights, (3, -2, 7))
+    mesh, field = Mesh(path, WHITE, periodic), HeightField(heights, spacing, WHITE, periodic)
+    assert mesh.tile(None)[1:5] == pytest.approx(field.tile(None)[1:5], rel=1e-5)
+    one, other = run(mesh, paths=2**17, orders=1), run(field, paths=2**17, orders=1, seed=1)
+    value, error = one.summed.value - other.summed.value, np.hypot(one.summed.error, other.summed.error)
+    assert one.total_albedo.value[0, 0] < 0.9 and agrees(value[..., 0], 0, error[..., 0])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_mirrored_copies_look_up(rgb, sign):
+    """Saw teeth that light comes down on from +x: mirrored, both their slopes are there, and φ is no matter."""
+    teeth = HeightField(sign * np.array([[0, 1.0], [0, 1.0]]), 1, {"type": "diffuse"}, "mirror")
+    left, right = run(teeth, (60, 0), (60, 180), orders=1).total_albedo.value[:, 0]
+    assert teeth.tile(None)[1:3] == (1, 1) and left == pytest.approx(right, abs=0.01) and left > 0.2
+
+
+def test_overhangs_are_counted_and_traced(rgb, tmp_path):
+    """A ridge of a Z-shaped profile: one of its three walls, of two triangles, looks down."""
+    profile = [(0, 0), (0.6, 0), (0.4, 0.3), (1, 0.3), (1.2, 0)]
+    vertices = [(x, y, z) for y in (0, 1) for x, z in profile]
+    faces = [face for k in range(4) for face in ((k, k + 1, k + 6), (k, k + 6, k + 5))]
+    mesh = Mesh(write(tmp_path / "z.ply", vertices, faces), MIRROR)
+    assert mesh.overhangs == 2 and HeightField(waves(), 1).overhangs == 0
+    result = run(mesh, (30, 0), (30, 180))
+    assert agrees(result.total_albedo.value, 1, result.total_albedo.error) and not result.transmitted.value.any()
+
+
+def test_a_tile_is_built_once_and_described_in_plain_words(rgb, tmp_path):
+    field, mesh = HeightField(waves(), 1, WHITE), Mesh(grid(tmp_path / "flat.ply", FLAT))
+    for geometry in (field, mesh):
+        assert geometry.tile(None) is geometry.tile(np.random.default_rng(0))
+        assert json.loads(json.dumps(geometry.description)) == geometry.description
+    assert HeightField(waves(), 1, WHITE).description == field.description
+    assert HeightField(waves() + 1e-9, 1, WHITE).description != field.description
+    before = mesh.description
+    grid(tmp_path / "flat.ply", FLAT, (0, 0, 1))
+    assert Mesh(tmp_path / "flat.ply").description["sha256"] != before["sha256"]
+
+
+@pytest.mark.parametrize("ending", [".npy", ".png", ".exr"])
+def test_heights_are_read_as_stored(rgb, tmp_path, ending):
+    """No sRGB curve: a .png of 16 bits is good to half of 2^-16."""
+    heights, path = np.random.default_rng(0).random((4, 6)), tmp_path / f"heights{ending}"
+    if ending == ".npy":
+        np.save(path, heights)
+    else:
+        image = mi.Bitmap(np.float32(np.stack([heights, 0 * heights, 0 * heights], axis=-1)))
+        if ending == ".png":
+            image = image.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt16, srgb_gamma=False)
+        image.write(str(path))
+    field = HeightField.load(path, 0.1, scale=3)
+    assert np.allclose(field.heights, 3 * heights, atol=3e-5)
+    assert field.description["source"]["path"] == str(path.resolve()) and field.description["source"]["scale"] == 3
+
+
+def moved(k, point):
+    return [point if k == n else vertex for n, vertex in enumerate(SQUARE)]
+
+
+@pytest.mark.parametrize(
+    "vertices, faces, words",
+    [
+        (SQUARE, [], "no faces"),
+        (moved(2, (1, np.nan, 0)), HALVES, "vertex 2 .*nan.*1 such|invalid vertex"),
+        (SQUARE, [*HALVES, (0, 1, 9)], "face 2 .*4; 1 such|invalid vertex"),
+        ([(x, 0, y) for x, y, _ in SQUARE], HALVES, "spans .1, 0, 1.*y up"),
+        (SQUARE, [HALVES[0], (0, 3, 2)], "face 0 .*opposite orientation .*1 such"),
+        ([*SQUARE, (0.5, 0.5, 1)], [*HALVES, (0, 4, 2)], "face 0 .*more than one .*1 such"),
+        (SQUARE, HALVES[:1], "hole. Face 0 .*1 such"),
+        (SQUARE, [face[::-1] for face in HALVES], "upside down.*Flip"),
+        (
+            [*SQUARE, (0.5, 0.5, 1)],
+            [(2, 1, 0), (3, 2, 0), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)],
+            "cover 0 of .*closed body",
+        ),
+        (
+            moved(2, (1, 1, 0.1)),
+            HALVES,
+            'borders in x do not match.* y = 1, z = 0 .*0.0995.* apart.*periodic="mirror"',
+        ),
+        ([(x, y, 1e4 * x * y) for x, y, _ in SQUARE], HALVES, "same unit"),
+    ],
+)
+@pytest.mark.parametrize("ending", [".ply", ".obj"])
+def test_a_bad_mesh_is_named(rgb, tmp_path, vertices, faces, words, ending):
+    """Mitsuba itself refuses some, whose messages are passed on."""
+    periodic = "mirror" if words == "same unit" else "wrap"
+    with pytest.raises(AsperityError, match=re.compile(words, re.S)):
+        Mesh(write(tmp_path / f"bad{ending}", vertices, faces), periodic=periodic)
+
+
+def test_mirroring_mends_borders_and_empty_faces_do_no_harm(rgb, tmp_path):
+    path = write(tmp_path / "tilted.ply", moved(2, (1, 1, 0.1)), [*HALVES, (0, 0, 1), (2, 2, 2)])
+    mesh = Mesh(path, WHITE, "mirror")
+    assert len(mesh.triangles.faces) == 2 and run(mesh).transmitted.value.max() == 0
+
+
+@pytest.mark.parametrize(
+    "name, content, words",
+    [
+        ("missing.ply", None, "no such file"),
+        ("mesh.stl", b"solid", "ending is '.stl'.*.ply, .obj"),
+        ("junk.ply", b"junk", "invalid PLY header"),
+        ("heights.jpg", b"", "ending is '.jpg'.*.npy, .png, .exr"),
+        ("junk.npy", b"junk", "junk.npy"),
+        ("junk.exr", b"junk", "junk.exr"),
+    ],
+)
+def test_a_bad_file_is_named(rgb, tmp_path, name, content, words):
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(UnreadableFileError, match=words):
+        Mesh(path) if path.suffix in (".ply", ".stl") else HeightField.load(path, 1)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"heights": np.zeros(5)}, r"2-D.*\(5,\)"),
+        ({"heights": np.zeros((1, 5))}, r"at least 2 x 2.*\(1, 5\)"),
+        ({"heights": [[1, 2], [3]]}, "heights: expected a 2-D array"),
+        ({"heights": [[1, 2], [np.inf, np.nan]]}, r"heights\[1, 0\] = inf.*2 are not"),
+        ({"heights": [[0, 1], [0, 900]]}, "same unit"),
+        ({"spacing": 0}, "spacing = 0"),
+        ({"spacing": (1, -2)}, r"spacing = \(1, -2\)"),
+        ({"spacing": "wide"}, "spacing = 'wide'"),
+        ({"spacing": (1, 2, 3)}, r"spacing = \(1, 2, 3\)"),
+        ({"periodic": "mirrored"}, "mirrored.*Did you mean 'mirror'"),
+        ({"bsdf": {"type": "difuse"}}, "bsdf = .*difuse.*not found"),
+        ({"bsdf": {"type": "diffuse", "colour": 1.0}}, "unreferenced.*colour"),
+        ({"bsdf": {"type": "sphere"}}, "expected a BSDF.*Shape"),
+    ],
+)
+def test_a_bad_height_field_is_named(rgb, change, words):
+    with pytest.raises(AsperityError, match=re.compile(words, re.S)):
+        HeightField(**{"heights": FLAT, "spacing": 1} | change)
