@@ -1,5 +1,6 @@
 """The instrument: energy, errors, seeds, and what it refuses."""
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -228,3 +229,21 @@ def test_scalar_variants_are_refused():
     mi.set_variant("scalar_rgb")
     with pytest.raises(ParameterError, match="llvm_ad_rgb"):
         measure(ExplicitGrains(0.3), [(30, 0)], **FEW)
+
+
+def test_light_along_the_surface_is_given_up():
+    # A facet that reflects exactly along the plane: such rays meet neither facets nor the top.
+    class Grazing(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.m_components = [int(mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide)]
+            self.m_flags = self.m_components[0]
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo, bs.eta, bs.pdf = mi.Vector3f(1, 0, 0), 1, 1
+            return bs, mi.Spectrum(1) & active
+
+    mi.register_bsdf("grazing", Grazing)
+    measured = measure(ExplicitGrains(0.0, base={"type": "grazing"}), [(30, 0)], paths=64, tiles=2)
+    assert measured.cut.value[0, 0] == 1 and measured.total_albedo.value[0, 0] == 0

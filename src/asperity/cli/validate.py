@@ -49,8 +49,9 @@ def validate(
     seconds = time.perf_counter() - start
     preface = (
         f"Made by `asperity validate {model}{' --quick' if quick else ''}`, asperity {__version__}: "
-        f"{paths:g} paths per direction through {tiles} random tiles, seed {seed}, {seconds:.0f} s. Errors are "
-        "standard errors over the tiles. The bounds are such that a right model fails a report with a probability of 1 %."
+        f"{paths:g} paths per direction through {tiles} random tiles, seed {seed}, {seconds:.0f} s. "
+        "Errors are standard errors over the tiles. The bounds are such that a right model fails a report with a "
+        "probability of 1 %."
     )
     path = report.write(f"`{model}` against its microgeometry", preface, found, folder)
     console.stdout().print(table)

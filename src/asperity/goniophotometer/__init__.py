@@ -7,6 +7,8 @@ from .measure import measure as measure
 from .measurement import Estimate as Estimate
 from .measurement import Measurement as Measurement
 from .measurement import merge as merge
+from .mesh import HeightField as HeightField
+from .mesh import Mesh as Mesh
 from .microgeometry import Microgeometry as Microgeometry
 from .microgeometry import Tile as Tile
 from .sensors import Hemisphere as Hemisphere

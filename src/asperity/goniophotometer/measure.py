@@ -13,15 +13,13 @@ from ..errors import ParameterError
 from .measurement import Measurement, check_alike
 from .microgeometry import Microgeometry, Tile
 from .sensors import Hemisphere, Points, Sensor, check_angles
-from .tracer import EXTRA, Settings, trace
+from .tracer import EXTRA, VISIBLE, Settings, trace
 
 BATCH = 2**20
 """Paths in one kernel launch, at most: they fill any processor, and little memory."""
 PATHS, TILES = 2**22, 32
 ENDLESS = 10_000
 """Scatterings that stand for all of them; what is left is counted as cut."""
-VISIBLE = (440.0, 520.0, 580.0, 650.0)
-"""nm, in spectral variants, unless others are asked for."""
 
 
 def measure(
