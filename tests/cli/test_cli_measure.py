@@ -1,5 +1,9 @@
+import errno
+import os
+import re
 import signal
 import sys
+from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -195,3 +199,20 @@ def test_continue_wants_the_same(asperity):
         result = asperity(*GRAINS, "--continue", "grains.npz", option, value)
         assert result.exit_code == 2 and culprit in result.stderr
     assert "is there twice" in asperity("merge", "grains.npz", "grains.npz").stderr
+
+
+def test_a_full_disk_keeps_what_was_measured_elsewhere(asperity, tmp_path, monkeypatch):
+    works(asperity(*GRAINS, "--theta", "30", "-o", "full.npz"))
+    before = Measurement.load("full.npz")
+    replace = os.replace
+
+    def full(source, target):
+        if target.name == "full.npz" and target.parent == Path("."):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        replace(source, target)
+
+    monkeypatch.setattr("asperity.files.os.replace", full)
+    output = works(asperity(*GRAINS, "--theta", "30", "--continue", "full.npz"))
+    rescued = re.search(r"Kept as (\S+full\.npz)", output)[1]
+    assert "No space left" in output and Measurement.load(rescued).total_paths == 2 * before.total_paths
+    assert np.array_equal(Measurement.load("full.npz").energy, before.energy) and files(tmp_path) == ["full.npz"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 import time
 from collections.abc import Collection
 from itertools import product
@@ -137,7 +138,7 @@ def measure(
             **{option: value for option, value in given.items() if value is not None},
         )
     seconds = time.perf_counter() - start
-    measured.save(out)
+    out = save(measured, out)
     report(measured)
     rate = (measured.total_paths - (earlier.total_paths if earlier else 0)) / seconds
     early = "stopped early: " if interrupted else ""
@@ -148,6 +149,18 @@ def measure(
         tensor_file.write(measured, tensor)
         typer.echo(tensor)
     typer.echo(f"Try next: asperity plot {out}")
+
+
+def save(measured: Measurement, out: Path) -> Path:
+    """Write the file; if that fails, because the disk is full, say, write it to the folder for temporary files."""
+    try:
+        measured.save(out)
+        return out
+    except OSError as error:
+        rescued = Path(tempfile.mkdtemp(prefix="asperity-")) / out.name
+        measured.save(rescued)
+        typer.echo(f"warning: cannot write {out}: {error.strerror}. Kept as {rescued}.", err=True)
+        return rescued
 
 
 def refuse(options: dict[str, Any], allowed: Collection[str], what: str) -> None:

@@ -239,7 +239,9 @@ def bases(effort: Effort) -> Section:
             measured = shoot(description, [(30.0, 40.0), (70.0, 250.0)], effort)
             claim = "{}: τ₀ {:g}, β {:g}, {:g}".format(name, *parameters)
             findings.append(judge(claim, measured, modelled(description, measured)[..., 0], tolerance))
-    return Section("Grains on a Lambertian base", "Incidence (30°, 40°) and (70°, 250°); all cells, and the albedo.", findings)
+    return Section(
+        "Grains on a Lambertian base", "Incidence (30°, 40°) and (70°, 250°); all cells, and the albedo.", findings
+    )
 
 
 def models(effort: Effort) -> Section:
