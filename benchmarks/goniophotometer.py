@@ -3,6 +3,7 @@
 python benchmarks/goniophotometer.py [--quick]
 """
 
+import asperity  # noqa: F401  isort: skip  (before Mitsuba)
 import argparse
 import time
 
@@ -10,13 +11,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-import asperity  # noqa: F401  # before Mitsuba
-
 mi.set_variant("llvm_ad_rgb")
 
 from asperity.goniophotometer import Hemisphere  # noqa: E402
 from asperity.goniophotometer.sensors import directions  # noqa: E402
-from asperity.goniophotometer.tracer import UNIT, Box, Settings, generator, opaque, trace  # noqa: E402
+from asperity.goniophotometer.tile import opaque  # noqa: E402
+from asperity.goniophotometer.tracer import UNIT, Settings, generator, trace  # noqa: E402
 from asperity.models.micrograin import ExplicitGrains  # noqa: E402
 
 PATHS, ORDERS, THETA = 2**20, 64, 60.0
@@ -45,7 +45,7 @@ def paths(tile, orders, repeats):
 
 def intersections(tile, repeats):
     """Mitsuba's rays/s: those by which paths enter, as the instrument orders them, hitting `tile.scene`."""
-    box = Box(tile)
+    box = tile.rays()
 
     def run():
         rng, corner = generator(np.random.SeedSequence(1), PATHS)

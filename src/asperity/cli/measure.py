@@ -280,7 +280,7 @@ def report(measured: Measurement) -> None:
         for k in range(measured.orders):
             part = type(measured.albedo)(*(values[:, k] for values in measured.albedo))
             shown[f"order {k + 1}{more if k == measured.orders - 1 else ''}"] = part
-    shown |= {what: part for what in ("transmitted", "cut") if np.any((part := getattr(measured, what)).value > 0)}
+    shown |= {what: part for what in ("transmitted", "cut") if np.any((part := getattr(measured, what)).value > 1e-6)}
     differ = np.ptp(measured.energy, axis=-1).any()
     table = Table("θ [°]", "φ [°]", *(["channel"] if differ else []), *shown)
     for row, (theta, phi) in enumerate(measured.incident):
@@ -288,6 +288,12 @@ def report(measured: Measurement) -> None:
             values = (with_error(part.value[row, channel], part.error[row, channel]) for part in shown.values())
             table.add_row(f"{theta:g}", f"{phi:g}", *([name] if differ else []), *values)
     console.stdout().print(table)
+    value, error = measured.total_albedo
+    noise = np.sqrt(np.clip(value * (1 - value), 0, None) / np.maximum(measured.paths.sum(axis=0), 1)[:, None])
+    if np.any(error > 4 * noise) and np.all(noise > 0):
+        typer.echo(
+            "The surface's own randomness makes most of these errors: more --tiles lower them, more --paths do not."
+        )
 
 
 def with_error(value: float, error: float) -> str:

@@ -10,7 +10,7 @@ from .measurement import merge as merge
 from .mesh import HeightField as HeightField
 from .mesh import Mesh as Mesh
 from .microgeometry import Microgeometry as Microgeometry
-from .microgeometry import Tile as Tile
 from .sensors import Hemisphere as Hemisphere
 from .sensors import Points as Points
 from .sensors import Window as Window
+from .tile import Tile as Tile

@@ -18,9 +18,10 @@ import numpy as np
 from ..errors import ParameterError
 from .measure import BATCH, PATHS, TILES
 from .measurement import Estimate, estimate
-from .microgeometry import Microgeometry, Tile
+from .microgeometry import Microgeometry
 from .sensors import Hemisphere, Sensor, check_angles, directions
-from .tracer import Box, generator, solid, visible
+from .tile import Tile
+from .tracer import generator, visible
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,9 @@ def measure_masking(
     counts, parts = [], []
     for number in range(tiles):
         tile = geometry.tile(np.random.default_rng([seed, number]))
-        parts = [shape.id() for shape in tile.scene.shapes()]
+        if not isinstance(tile, Tile):
+            raise ParameterError(f"masking needs shapes that one can look at, not {type(tile).__name__}.")
+        parts = list(tile.facets())
         total: Any = 0
         for done in range(0, quota, batch):
             stream = np.random.SeedSequence([seed, number, done])
@@ -100,14 +103,14 @@ def measure_masking(
 
 def look(tile: Tile, sensor: Sensor, pairs: Sequence, seed: np.random.SeedSequence, lanes: int) -> np.ndarray:
     """Counts (exposed / facing / seen, pairs, parts, cells) of points that are seen along both directions of a pair."""
-    box = Box(tile)
+    box = tile.rays()
     rng, corner = generator(seed, lanes)
     step = box.step(box.enter(rng, corner, lanes), mi.Vector3f(0, 0, -1), mi.Bool(True))
     si, shapes = step.si, tile.scene.shapes()
     part = sum(dr.select(si.shape == mi.ShapePtr(shape), k, mi.UInt32(0)) for k, shape in enumerate(shapes))
     cell, inside = sensor.locate(mi.Vector3f(si.n))
     pair = dr.arange(mi.UInt32, lanes) % len(pairs)
-    exposed = facing = seen = step.hit & solid(si, si.bsdf()) & inside
+    exposed = facing = seen = step.hit & inside
     for angles in zip(*pairs):
         w = dr.gather(mi.Vector3f, mi.Vector3f(directions(angles).T), pair)
         faces = dr.dot(si.n, w) > 0

@@ -11,9 +11,10 @@ import numpy as np
 
 from ..errors import ParameterError
 from .measurement import Measurement, check_alike
-from .microgeometry import Microgeometry, Tile
+from .microgeometry import Microgeometry, Piece
 from .sensors import Hemisphere, Points, Sensor, check_angles
-from .tracer import EXTRA, VISIBLE, Settings, trace
+from .tile import VISIBLE
+from .tracer import EXTRA, Settings, trace
 
 BATCH = 2**20
 """Paths in one kernel launch, at most: they fill any processor, and little memory."""
@@ -143,11 +144,11 @@ def _wavelengths(given: Sequence[float] | None) -> tuple[float, ...]:
     return chosen
 
 
-def _check_facets(tile: Tile) -> None:
+def _check_facets(piece: Piece) -> None:
     """Light cannot be sent from mirrors to given directions."""
-    for shape in tile.scene.shapes():
-        if int(shape.bsdf().flags()) & int(mi.BSDFFlags.Delta):
+    for name, bsdf in piece.facets().items():
+        if int(bsdf.flags()) & int(mi.BSDFFlags.Delta):
             raise ParameterError(
-                f"points: the facets of {shape.id()!r} are mirrors ({shape.bsdf().class_name()}): no light leaves "
+                f"points: the facets of {name!r} are mirrors ({bsdf.class_name()}): no light leaves "
                 "them in exactly these directions. Use a hemisphere or a window."
             )

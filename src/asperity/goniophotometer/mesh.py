@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import ParameterError, UnknownNameError, UnreadableFileError, readable
-from .microgeometry import Tile
+from .tile import Tile
 
 MESHES = (".ply", ".obj")
 HEIGHTS = (".npy", ".png", ".exr")

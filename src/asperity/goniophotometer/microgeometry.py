@@ -1,4 +1,4 @@
-"""What the goniophotometer measures: a surface that repeats, as a scene of Mitsuba's."""
+"""What the goniophotometer measures: anything that says what becomes of a ray."""
 
 from __future__ import annotations
 
@@ -8,28 +8,52 @@ import mitsuba as mi
 import numpy as np
 
 
-class Tile(NamedTuple):
-    """One period of a surface. Its normal is z; the middle of the tile is the origin of x and y.
+class Step(NamedTuple):
+    """What happens to a ray next: it hits a facet, leaves through top or bottom, or else goes on from ``onwards``."""
 
-    Shapes of ``scene`` that stick out of the tile must be there twice: once more where the next tile's stick in.
-    """
+    si: Any
+    bsdf: Any
+    hit: Any
+    left: Any
+    onwards: Any
 
-    scene: mi.Scene
-    width: float  # period in x
-    depth: float  # period in y
-    bottom: float  # height below which there is nothing
-    top: float  # height above which there is nothing
-    window: float = np.inf  # side of the square through which a batch of rays enters: coherent rays are fast rays
+
+class Rays(Protocol):
+    """A piece of surface for a batch of rays; arrays, a lane a ray."""
+
+    def enter(self, rng: mi.PCG32, corner: Any, lanes: int) -> mi.Point3f:
+        """Points above everything, uniform over the plane; ``corner`` is a random point of the unit square."""
+        ...
+
+    def step(self, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> Step:
+        """What happens next to rays from ``o`` along ``d``."""
+        ...
+
+    def leave(self, si: Any, d: mi.Vector3f) -> mi.Point3f:
+        """Where a ray along ``d`` starts after it was scattered at ``si``."""
+        ...
+
+
+class Piece(Protocol):
+    """A piece of a surface: a `Tile`, or formulas."""
+
+    def rays(self, wavelengths: tuple[float, ...]) -> Rays:
+        """The piece for rays of these wavelengths (nm, in spectral variants)."""
+        ...
+
+    def facets(self) -> dict[str, mi.BSDF]:
+        """What its facets are made of, by name."""
+        ...
 
 
 class Microgeometry(Protocol):
-    """A kind of surface, from which tiles are drawn."""
+    """A kind of surface, from which pieces are drawn."""
 
     @property
     def description(self) -> dict[str, Any]:
         """What identifies it in a file of measurements; numbers, words, lists and dictionaries only."""
         ...
 
-    def tile(self, rng: np.random.Generator) -> Tile:
-        """A tile: one of many, if the surface is random, else always the same."""
+    def tile(self, rng: np.random.Generator) -> Piece:
+        """A piece: one of many, if the surface is random, else always the same."""
         ...

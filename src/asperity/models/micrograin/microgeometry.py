@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...errors import ParameterError
-from ...goniophotometer.microgeometry import Tile
+from ...goniophotometer.tile import Tile
 
 BLACK = {"type": "diffuse", "reflectance": 0.0}
 COHERENT = 4096
