@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from .microgeometry import Step
 from .tile import opaque
@@ -42,7 +41,7 @@ class Grooves:
 
 
 class GrooveRays:
-    """Rays in grooves. A point is (x across the opening, in [0, 1], whatever, height); its place along does not matter."""
+    """Rays in grooves. A point is (x across the opening, in [0, 1]; 0; height): where along it is does not matter."""
 
     def __init__(self, grooves: Grooves, wavelengths: Any):
         self.grooves, self.wavelengths = grooves, wavelengths
@@ -57,14 +56,7 @@ class GrooveRays:
 
     def step(self, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> Step:
         """Follow rays to the nearer of the two planes, or out."""
-        to_first, to_second = (
-            dr.select(
-                (cos := dr.dot(d, n)) < 0,
-                dr.maximum(-((o.x - x) * dr.dot(n, self.across) + o.z * n.z) / cos, 0),
-                dr.inf,
-            )
-            for x, n in zip((0, 1), self.normals)
-        )
+        to_first, to_second = (self._distance(o - mi.Vector3f(x, 0, 0), d, n) for x, n in zip((0, 1), self.normals))
         nearest = dr.minimum(to_first, to_second)
         left = (d.z > 0) & (nearest * d.z >= -o.z)
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(o))
@@ -74,6 +66,12 @@ class GrooveRays:
         si.wi = si.to_local(-d)
         si.p = mi.Point3f(o.x + nearest * dr.dot(d, self.across), 0, o.z + nearest * d.z)
         return Step(si, self.grooves.bsdf, active & ~left, active & left, o)
+
+    def _distance(self, o: mi.Vector3f, d: mi.Vector3f, normal: mi.Vector3f) -> mi.Float:
+        """To a plane through the origin, met from above."""
+        cos = dr.dot(d, normal)
+        above = o.x * dr.dot(normal, self.across) + o.z * normal.z
+        return dr.select(cos < 0, dr.maximum(-above / cos, 0), dr.inf)
 
     def leave(self, si: Any, d: mi.Vector3f) -> mi.Point3f:
         """A facet is never hit again by what leaves it: planes are met from above only."""
