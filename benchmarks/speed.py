@@ -32,7 +32,19 @@ MATERIALS = {
     "micrograin, diffuse grains": {"type": "micrograin", "tau_0": 0.4, "beta": 0.5, "specular": False},
     "micrograin, coated grains": {"type": "micrograin", "tau_0": 0.4, "beta": 0.5, "int_ior": 1.5},
 }
-REFERENCE = next(iter(MATERIALS))
+GROOVES = {"type": "vgroove", "material": "Au"}
+MATERIALS |= {f"vgroove, alpha {alpha:g}": {**GROOVES, "alpha": alpha} for alpha in (0.1, 0.3, 1.0)}
+MATERIALS["vgroove, alpha 0.3, non-symmetric"] = {**GROOVES, "alpha": 0.3, "symmetric": False}
+MATTE = {"diffuse": {"type": "diffuse"}}
+MATTE |= {
+    f"{name}, {variant}": {"type": name, "variant": variant}
+    for name, variants in {
+        "lambertsphere": ("accurate", "published", "fast"),
+        "orennayar": ("full", "qualitative"),
+    }.items()
+    for variant in variants
+}
+MATTE["chandrasekhar"] = {"type": "chandrasekhar"}
 LANES = 1 << 21
 
 
@@ -132,20 +144,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="few, small frames")
     parser.add_argument("--only", help="part of a material's name")
+    parser.add_argument("--matte", action="store_true", help="matte materials, against `diffuse`")
     quick, only = (args := parser.parse_args()).quick, args.only
+    if args.matte:
+        MATERIALS.clear()
+        MATERIALS.update(MATTE)
+    reference = next(iter(MATERIALS))
     mi.set_variant("llvm_ad_rgb")
     mi.set_log_level(mi.LogLevel.Error)
     register()
     if only:
-        for name in [name for name in MATERIALS if name != REFERENCE and only not in name]:
+        for name in [name for name in MATERIALS if name != reference and only not in name]:
             del MATERIALS[name]
     size, spp, rounds = (128, 16, 5) if quick else (256, 32, 11)
     columns = {name: frames(make, rounds) for name, make in scenes(size, spp).items()}
     columns |= {f"{method}, ns": calls(method, rounds) for method in ("eval_pdf", "sample")}
-    table = Table("", *columns, title="ratio to roughconductor (and time)")
+    table = Table("", *columns, title=f"ratio to {reference} (and time)")
     for name in MATERIALS:
         cells = (
-            f"{times[name] / times[REFERENCE]:.2f}  ({times[name] if 'ns' in column else times[name] * 1e3:.3g})"
+            f"{times[name] / times[reference]:.2f}  ({times[name] if 'ns' in column else times[name] * 1e3:.3g})"
             for column, times in columns.items()
         )
         table.add_row(name, *cells)

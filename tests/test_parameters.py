@@ -109,3 +109,9 @@ def test_artist_friendly_metal_reflects_what_was_asked(rgb, reflectivity, edge_t
     eta, k = artist_friendly(mi.Float(reflectivity), mi.Float(edge_tint))
     at_normal = mi.fresnel_conductor(mi.Float(1), mi.Complex2f(eta, k))
     assert at_normal[0] == pytest.approx(reflectivity, abs=2e-5)  # float32: eta and k reach 40 at the edges
+
+
+@pytest.mark.parametrize("given", [0, -3, 2.0, True, "two"])
+def test_whole_numbers_are_whole_and_in_range(rgb, given):
+    with pytest.raises(RuntimeError, match=r"max_bounces = .*: expected a whole number in \[1, inf\)"):
+        mi.load_dict({"type": "vgroove", "max_bounces": given})

@@ -124,7 +124,7 @@ class Texture(Parameter):
 
     def check(self, value: Any) -> None:
         """Check every constant and texel that Mitsuba shows."""
-        for key, data in _numbers(value):
+        for key, data in numbers(value):
             low, high = data.min(), data.max()
             if not (self.holds(low) and self.holds(high)):
                 raise self.wrong(self.name, f"{high if self.holds(low) else low:g}", where=f" (in its {key!r})")
@@ -184,6 +184,25 @@ class Choice(Parameter):
 
 
 @dataclass(frozen=True)
+class Integer(Parameter):
+    """A whole number from ``low`` on."""
+
+    low: int = 0
+    kind: ClassVar[str] = "whole number"
+
+    def allowed(self) -> str:
+        """The range as an interval."""
+        return f"[{self.low}, inf)"
+
+    def parse(self, props: mi.Properties) -> int | None:
+        """The number, or the default; flags and fractions are not accepted."""
+        given = props.get(self.name, self.default)
+        if self.name in props and (isinstance(given, bool) or not isinstance(given, int) or given < self.low):
+            raise self.wrong(self.name, repr(given))
+        return given
+
+
+@dataclass(frozen=True)
 class Flag(Parameter):
     """True or false."""
 
@@ -217,6 +236,12 @@ class BSDF(Parameter):
         return given
 
 
+def conflict(first: set[str], second: set[str], why: str = "give one or the other") -> None:
+    """Raise ParameterError if both sets have members."""
+    if first and second:
+        raise ParameterError(f"{min(first)} and {min(second)} exclude each other: {why}.")
+
+
 def is_unnamed(name: str) -> bool:
     """Whether Mitsuba made up ``name`` for a nested object that has none in the XML."""
     return name.startswith("_arg_")
@@ -237,6 +262,11 @@ class Declared:
     def declarations(cls) -> list[Parameter]:
         """The parameters in the order in which the class body names them."""
         return [value for value in vars(cls).values() if isinstance(value, Parameter)]
+
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """The default of each parameter, by name."""
+        return {parameter.name: parameter.default for parameter in cls.declarations()}
 
     @classmethod
     def rows(cls) -> list[Row]:
@@ -280,18 +310,18 @@ class Declared:
             parameter.check(getattr(self, parameter.name))
 
 
-def _numbers(texture: Any) -> Iterable[tuple[str, np.ndarray]]:
-    """The constants and texels of a texture; not those that are being differentiated: they are the optimiser's."""
+def numbers(texture: Any, differentiated: bool = False) -> Iterable[tuple[str, np.ndarray]]:
+    """The constants and texels of a texture; those being ``differentiated`` only if asked."""
     if isinstance(ours := getattr(texture, "model", None), Declared):
         for name in ours.between:
-            yield from _numbers(getattr(ours, name))
+            yield from numbers(getattr(ours, name), differentiated)
         return
     for key, data in mi.traverse(texture).items() if isinstance(texture, mi.Texture) else ():
-        if key.rsplit(".", 1)[-1] not in ("value", "values", "data") or dr.grad_enabled(data):
+        if key.rsplit(".", 1)[-1] not in ("value", "values", "data") or (dr.grad_enabled(data) and not differentiated):
             continue
-        numbers = np.asarray(data)
-        if numbers.dtype == np.uint8:
-            numbers = numbers / 255
+        found = np.asarray(dr.detach(data))
+        if found.dtype == np.uint8:
+            found = found / 255
         # In spectral variants Mitsuba keeps colours as three coefficients, which have no range.
-        if not (mi.is_spectral and numbers.size > 1 and 3 in (numbers.shape[0], numbers.shape[-1])):
-            yield key, numbers
+        if not (mi.is_spectral and found.size > 1 and 3 in (found.shape[0], found.shape[-1])):
+            yield key, found

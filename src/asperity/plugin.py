@@ -26,13 +26,15 @@ def register() -> None:
 
 
 def _switched(_old: str | None, new: str | None) -> None:
-    from .models import MODELS, TEXTURES  # they import Mitsuba, whose import may be what brought us here
+    from .models import MODELS, PHASES, TEXTURES  # they import Mitsuba, whose import may be what brought us here
 
     llvm.guard(new)
     for name, model in MODELS.items():
         mi.register_bsdf(name, _bsdf(model, new))
     for name, model in TEXTURES.items():
         mi.register_texture(name, _texture(model, new))
+    for name, model in PHASES.items():
+        mi.register_phase(name, _phase(model, new))
 
 
 @cache
@@ -67,6 +69,8 @@ def _bsdf(model_class: Any, variant: str) -> type:
 
         def eval_diffuse_reflectance(self, si, active=True):
             # Mitsuba's default, pi times the value at normal incidence, is right for Lambertian BSDFs only.
+            if hasattr(self.model, "directional_albedo"):
+                return _depolarise(self.model.directional_albedo(si, active))
             return _depolarise(directional_albedo(self.model.sample, si, active, ALBEDO_SAMPLES))
 
         def traverse(self, callback: mi.TraversalCallback) -> None:
@@ -111,6 +115,40 @@ def _texture(model_class: Any, variant: str) -> type:
 
         def is_spatially_varying(self) -> bool:
             return True
+
+        def parameters_changed(self, keys: list[str]) -> None:
+            self.model.check()
+
+        def traverse(self, callback: mi.TraversalCallback) -> None:
+            for name, child in self.model.children().items():
+                callback.put(name, child, mi.ParamFlags.Differentiable)
+
+        def to_string(self) -> str:
+            return f"{model_class.__name__}[]"
+
+    Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
+    return Plugin
+
+
+@cache
+def _phase(model_class: Any, variant: str) -> type:
+    """The ``mi.PhaseFunction`` of the active ``variant`` that wraps a phase function of ours."""
+
+    class Plugin(mi.PhaseFunction):
+        """Mitsuba's view of a phase function of one component, which depends on the angle."""
+
+        def __init__(self, props: mi.Properties) -> None:
+            mi.PhaseFunction.__init__(self, props)
+            self.model = model_class.parse(props)
+            self.m_flags = int(mi.PhaseFunctionFlags.Anisotropic)
+
+        def eval_pdf(self, ctx, mei, wo, active=True):
+            value, pdf = self.model.eval_pdf(ctx, mei, wo, active)
+            return _depolarise(value), pdf
+
+        def sample(self, ctx, mei, sample1, sample2, active=True):
+            wo, weight, pdf = self.model.sample(ctx, mei, sample1, sample2, active)
+            return wo, _depolarise(weight), pdf
 
         def parameters_changed(self, keys: list[str]) -> None:
             self.model.check()

@@ -41,6 +41,40 @@ SPREAD = {
         "dense": {"material": "Au", "tau_0": 0.95, "beta": 2.0},
         "sparse": {"tau_0": 0.02, "beta_x": 0.2, "beta_y": 0.8, "base": ROUGH},
     },
+    "lambertsphere": {
+        "default": {},
+        "colour": {"reflectance": {"type": "rgb", "value": [0.05, 0.4, 0.9]}},
+        "white": {"albedo": 1.0},
+        "black": {"reflectance": 0.0},
+        "dark": {"albedo": 0.05},
+        "published": {"variant": "published", "reflectance": 0.8},
+        "fast": {"variant": "fast"},
+    },
+    "chandrasekhar": {"default": {}, "white": {"reflectance": 1.0}, "dark": {"albedo": 0.05}},
+    "orennayar": {
+        "default": {},
+        "rough": {"reflectance": 0.9, "sigma": 60.0},
+        "qualitative": {"variant": "qualitative", "sigma": 40.0},
+    },
+    "vgroove": {
+        "default": {},
+        "gold": {"material": "Au", "alpha": 0.5},
+        "rough": {"material": "Cu", "alpha": 1.0},
+        "beckmann": {"distribution": "beckmann", "alpha": 0.6, "material": "Al"},
+        "phong": {"distribution": "phong", "exponent": 2.0, "material": "Au"},
+        "elliptic": {"distribution": "beckmann", "alpha_u": 0.2, "alpha_v": 0.6, "material": "Cu"},
+        "elliptic phong": {"distribution": "phong", "alpha_u": 0.3, "alpha_v": 0.9},
+        "single bounce": {"max_bounces": 1, "alpha": 0.5, "material": "Au"},
+        "textured": {
+            "alpha_u": {"type": "checkerboard", "color0": 0.2, "color1": 0.4},
+            "alpha_v": 0.3,
+            "eta": {"type": "checkerboard", "color0": 0.2, "color1": 2.0},
+            "k": 3.0,
+        },
+        "non-symmetric": {"symmetric": False, "alpha": 0.5, "material": "Au"},
+        "non-symmetric beckmann": {"symmetric": False, "distribution": "beckmann", "alpha": 1.0},
+        "non-symmetric phong": {"symmetric": False, "distribution": "phong", "alpha_u": 0.3, "alpha_v": 0.8},
+    },
 }
 SLOW_TO_DIFFERENTIATE = {"by height", "coated", "diffuse anisotropic", "glass base", "multiple diffuse"}
 """Their derivatives unroll the quadrature: half a minute of compiling each. `asperity check` has no such exception."""

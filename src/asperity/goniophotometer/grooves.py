@@ -54,7 +54,7 @@ class GrooveRays:
         self.normals = [dr.sin(t) * s * self.across + dr.cos(t) * up for s, t in ((1, first), (-1, second))]
         return mi.Point3f(rng.next_float32(), 0, 0)
 
-    def step(self, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> Step:
+    def step(self, rng: mi.PCG32, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> Step:
         """Follow rays to the nearer of the two planes, or out."""
         to_first, to_second = (self._distance(o - mi.Vector3f(x, 0, 0), d, n) for x, n in zip((0, 1), self.normals))
         nearest = dr.minimum(to_first, to_second)

@@ -105,7 +105,7 @@ def look(tile: Tile, sensor: Sensor, pairs: Sequence, seed: np.random.SeedSequen
     """Counts (exposed / facing / seen, pairs, parts, cells) of points that are seen along both directions of a pair."""
     box = tile.rays()
     rng, corner = generator(seed, lanes)
-    step = box.step(box.enter(rng, corner, lanes), mi.Vector3f(0, 0, -1), mi.Bool(True))
+    step = box.step(rng, box.enter(rng, corner, lanes), mi.Vector3f(0, 0, -1), mi.Bool(True))
     si, shapes = step.si, tile.scene.shapes()
     part = sum(dr.select(si.shape == mi.ShapePtr(shape), k, mi.UInt32(0)) for k, shape in enumerate(shapes))
     cell, inside = sensor.locate(mi.Vector3f(si.n))
@@ -115,7 +115,7 @@ def look(tile: Tile, sensor: Sensor, pairs: Sequence, seed: np.random.SeedSequen
         w = dr.gather(mi.Vector3f, mi.Vector3f(directions(angles).T), pair)
         faces = dr.dot(si.n, w) > 0
         facing = facing & faces
-        seen = seen & faces & visible(box, box.leave(si, w), w, seen & faces)
+        seen = seen & faces & visible(box, rng, box.leave(si, w), w, seen & faces)
     shape = (3, len(pairs), len(shapes), sensor.cells)
     counts = dr.zeros(mi.UInt32, int(np.prod(shape)))
     for k, which in enumerate((exposed, facing, seen)):

@@ -25,8 +25,8 @@ class Rays(Protocol):
         """Points above everything, uniform over the plane; ``corner`` is a random point of the unit square."""
         ...
 
-    def step(self, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> Step:
-        """What happens next to rays from ``o`` along ``d``."""
+    def step(self, rng: mi.PCG32, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> Step:
+        """What happens next to rays from ``o`` along ``d``; in a random medium, chance decides."""
         ...
 
     def leave(self, si: Any, d: mi.Vector3f) -> mi.Point3f:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from functools import singledispatch
 from typing import Any, NamedTuple
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from matplotlib.axes import Axes
@@ -155,7 +154,8 @@ def plot_albedo(measured: Measurement, bsdf: Any, figure: SubFigure) -> None:
             where = line._replace(label=line.label + at, marker=MARKERS[n % len(MARKERS)])
             errorbars(axes, theta[chosen], value, error, where, size=2)
         if bsdf is not None:
-            values = model_albedo(measured, bsdf, grid, azimuth)
+            incident = directions(np.c_[grid, np.full(len(grid), azimuth)])
+            values = evaluate.albedo(bsdf, incident, SAMPLES, measured.wavelengths).T
             for one, style in model_lines(measured, values):
                 dashes = {"linestyle": ("-", "--", ":", "-.")[n % 4], "label": style["label"] and style["label"] + at}
                 axes.plot(grid, one, **style | dashes)
@@ -288,19 +288,6 @@ def model_means(measured: Measurement, k: int, bsdf: Any, cells: np.ndarray, wei
     wo = measured.sensor.directions(measured.wi[k], STEPS)[cells]  # (bins, n, steps², 3)
     means = evaluate.cell_means(bsdf, measured.wi[k], wo, measured.wavelengths)
     return (means * weights).sum(axis=-1).T
-
-
-def model_albedo(measured: Measurement, bsdf: Any, theta: np.ndarray, phi: float) -> np.ndarray:
-    """Directional albedo of a model at angles of incidence in degrees: (angles, channels)."""
-    golden = 1.2207440846057596  # x⁴ = x + 1: the sequence R3, which fills the cube evenly (Roberts 2018)
-    u = (np.arange(SAMPLES)[:, None] * golden ** -np.arange(1.0, 4.0)) % 1
-    u = np.tile(u, (len(theta), 1)).T
-    incident = directions(np.c_[theta, np.full(len(theta), phi)])
-    wi = evaluate.vectors(np.repeat(incident, SAMPLES, axis=0))
-    si = evaluate.interaction(wi, u.shape[1], measured.wavelengths)
-    bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
-    weight = dr.select(bs.wo.z > 0, mi.unpolarized_spectrum(weight), 0)
-    return evaluate.to_numpy(weight, u.shape[1]).reshape(-1, len(theta), SAMPLES).mean(axis=-1).T
 
 
 def disc(axes: Axes, theta: float, phi: float) -> None:

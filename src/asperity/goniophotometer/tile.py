@@ -60,7 +60,7 @@ class Box:
         x, y = ((turns - dr.floor(turns)) * 2 - 1) * self.half
         return mi.Point3f(x, y, self.heights.y)
 
-    def step(self, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> Step:
+    def step(self, rng: mi.PCG32, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> Step:
         """Follow rays to the nearest facet or wall. The backs of one-sided facets are air.
 
         Rays from the crease between two overlapping shapes may start inside one of them, as deep as the clearance.

@@ -40,11 +40,12 @@ def generator(seed: np.random.SeedSequence, lanes: int) -> tuple[mi.PCG32, mi.Po
 
 
 @dr.syntax
-def visible(rays: Rays, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> mi.Bool:
+def visible(rays: Rays, rng: mi.PCG32, o: mi.Point3f, d: mi.Vector3f, active: mi.Bool) -> mi.Bool:
     """Whether nothing is in the way from ``o`` along ``d`` to the top."""
+    rng = mi.PCG32(rng)  # what follows may use the same numbers: no sum of light is wrong for it
     o, seen, active, steps = mi.Point3f(o), mi.Bool(active), mi.Bool(active), mi.UInt32(0)
     while active:
-        step = rays.step(o, d, active)
+        step = rays.step(rng, o, d, active)
         seen &= ~step.hit
         active &= ~step.hit & ~step.left & (steps < STEPS)
         o = step.onwards
@@ -77,7 +78,7 @@ def trace(
         to = dr.gather(mi.Vector3f, mi.Vector3f(sensor.directions(wi)[:, 0].T), target)
     weight, order, steps, active = mi.UnpolarizedSpectrum(1), mi.UInt32(0), mi.UInt32(0), mi.Bool(True)
     while active:
-        step = rays.step(o, d, active)
+        step = rays.step(rng, o, d, active)
         si, bsdf = step.si, step.bsdf
         lost = ~step.left & ((step.hit & (order == settings.limit)) | (steps == STEPS))
         scattered = step.hit & ~lost
@@ -89,7 +90,7 @@ def trace(
         if dr.hint(aimed, mode="scalar"):
             value = mi.unpolarized_spectrum(bsdf.eval(ctx, si, si.to_local(to), scattered))
             lit = scattered & dr.any(value > 0)
-            count(order + 1, target, weight * value, visible(rays, rays.leave(si, to), to, lit))
+            count(order + 1, target, weight * value, visible(rays, rng, rays.leave(si, to), to, lit))
 
         bs, share = bsdf.sample(
             ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()), scattered

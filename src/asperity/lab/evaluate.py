@@ -11,6 +11,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from scipy.stats import qmc
 
 SHORTEST, LONGEST = 400.0, 700.0
 """nm. Spectral variants evaluate at wavelengths between these."""
@@ -155,3 +156,16 @@ def cell_means(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray, wavelengths: Any =
     si = interaction(vectors(np.atleast_2d(wi)), lanes, wavelengths)
     value = mi.unpolarized_spectrum(bsdf.eval(mi.BSDFContext(), si, vectors(wo.reshape(-1, 3))))
     return to_numpy(value, lanes).reshape(-1, *wo.shape[:-1]).mean(axis=-1)
+
+
+def albedo(bsdf: mi.BSDF, wi: np.ndarray, samples: int = 2**18, wavelengths: Any = None) -> np.ndarray:
+    """Directional albedo, the share that is reflected upwards, for directions (n, 3): (channels, n).
+
+    The mean weight of ``samples`` points of Sobol's sequence, a power of two.
+    """
+    points = qmc.Sobol(3, seed=1).random(samples)
+    u = np.tile(points, (len(wi), 1)).T
+    si = interaction(vectors(np.repeat(wi, samples, axis=0)), u.shape[1], wavelengths)
+    bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
+    reflected = dr.select(bs.wo.z > 0, mi.unpolarized_spectrum(weight), 0)
+    return to_numpy(reflected, u.shape[1]).reshape(-1, len(wi), samples).mean(axis=-1)

@@ -92,6 +92,13 @@ def patina() -> Image:
     return 0.85 * smoothstep(-0.5, 2, spread)
 
 
+def wear() -> Image:
+    """Roughness of a metal that was handled: smooth where it was touched, rough elsewhere, and scratched."""
+    rough = smoothstep(-1.2, 1.6, noise(31, 1.8, 3) + 0.25 * noise(32, 1.2, 16))
+    scratches = smoothstep(1.6, 2.6, noise(33, 0.7, 40, stretch=30))
+    return 0.05 + 0.95 * np.maximum(rough, 0.6 * scratches)
+
+
 def encoded(image: Image) -> NDArray[np.uint8]:
     """8 bits: a colour in sRGB, a grey one, which is data, as it is."""
     if image.ndim == 3:
@@ -101,5 +108,5 @@ def encoded(image: Image) -> NDArray[np.uint8]:
 
 if __name__ == "__main__":
     mi.set_variant("scalar_rgb")
-    for name, image in {"wood": wood(), **weave(), "patina": patina()}.items():
+    for name, image in {"wood": wood(), **weave(), "patina": patina(), "wear": wear()}.items():
         mi.Bitmap(encoded(image)).write(str(TEXTURES / f"{name}.png"), quality=9)

@@ -20,6 +20,15 @@ def axes(x: str, y: str, title: str) -> tuple[Figure, Axes]:
     return figure, found
 
 
+def grid(rows: int, columns: int, x: str, y: str, title: str) -> tuple[Figure, np.ndarray]:
+    """Empty diagrams (rows, columns)."""
+    figure = _figure(3.1 * columns, 2.2 * rows + 0.6)
+    figure.suptitle(title)
+    figure.supxlabel(x, fontsize=9)
+    figure.supylabel(y, fontsize=9)
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
 def slices(title: str, sensor: Sensor, truth: Estimate, models: dict[str, np.ndarray]) -> Figure:
     """The hemisphere as traced and as models have it, and the models' relative errors (Lucas 2024, Fig. 7 to 9).
 

@@ -315,7 +315,7 @@ def furnace(effort: Effort) -> Section:
             single = Estimate(*(part[:, 0, 0] for part in measured.albedo))
             total = measured.total_albedo.value[:, 0] + measured.cut.value[:, 0]
             truths.append(single)
-            found.append([albedo(evaluate.load(description), theta) for theta in THETAS])
+            found.append(evaluate.albedo(evaluate.load(description), directions(angles))[0])
             white.append((tau_0, beta, *(f"{s:.3f}" for s in single.value), f"{np.abs(total - 1).max():.1e}"))
 
             grey = description | {"eta": 1.0152, "k": 6.6273, "base": {"type": "diffuse", "reflectance": 0.5}}
@@ -345,13 +345,6 @@ def furnace(effort: Effort) -> Section:
     )
 
 
-def albedo(bsdf: mi.BSDF, theta: float, n: int = 2**20) -> float:
-    """Directional albedo of a BSDF, from the mean weight of its samples: exact visible normals have little noise."""
-    wi = evaluate.vectors(directions([(theta, 0.0)]))
-    _, weight = evaluate.sample(bsdf, wi, *evaluate.variates(n, 1))
-    return float(evaluate.to_numpy(weight, n)[0].mean())
-
-
 def multiple(effort: Effort) -> Section:
     """`scattering: multiple` against all orders."""
     thetas, rows = (5.0, 45.0, 75.0), []
@@ -371,7 +364,7 @@ def multiple(effort: Effort) -> Section:
         measured = shoot(description, [(theta, 0.0) for theta in thetas], effort, orders=None, apart=2)
         truth = measured.total_albedo.value[:, 0]
         found = {
-            name: np.array([albedo(evaluate.load(description | {"scattering": name}), theta) for theta in thetas])
+            name: evaluate.albedo(evaluate.load(description | {"scattering": name}), measured.wi)[0]
             for name in ("single", "multiple")
         }
         error = np.abs(found["multiple"] / truth - 1).max()

@@ -14,7 +14,7 @@ from scipy import stats
 from ..files import atomically
 from ..goniophotometer import Estimate
 
-SIGNIFICANCE, CLAIMS = 0.01, 32
+SIGNIFICANCE, CLAIMS = 0.01, 64
 """Probability that a right model fails a report which judges that many claims, over all numbers compared (Šidák)."""
 
 

@@ -11,9 +11,9 @@ from ...errors import ParameterError
 from ...microfacet.fresnel import conductor
 from ...microfacet.ggx import sample_visible_normal, smith_lambda
 from ...microfacet.numerics import log1p
-from ...parameters import Declared
+from ...parameters import Declared, conflict
 from ..micrograin.grains import normal_in_sphere_space
-from ..micrograin.model import ALL_COMPONENTS, ONE_BELOW, TINY, conflict
+from ..micrograin.model import ALL_COMPONENTS, ONE_BELOW, TINY
 from ..micrograin.shadows import lift, to_sphere
 
 

@@ -14,7 +14,7 @@ from ...errors import ParameterError
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import conductor
 from ...microfacet.quadrature import gauss_legendre
-from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture
+from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict
 from . import smith
 from .compensation import LossTable, lobe
 from .diffuse import lambertian
@@ -114,7 +114,7 @@ class Micrograin(Declared):
     def microgeometry(cls, description: dict[str, Any]) -> ExplicitGrains:
         """The explicit grains that a scene's description of this BSDF stands for."""
         mi.load_dict(description, parallel=False)  # complains of what is wrong with it
-        return ExplicitGrains.of({one.name: one.default for one in cls.declarations()} | description, set(description))
+        return ExplicitGrains.of(cls.defaults() | description, set(description))
 
     def configure(self, given: set[str]) -> None:
         """Settle what the grains are made of, and their axes; forget what is not used."""
@@ -439,9 +439,3 @@ class Micrograin(Declared):
 def _rescale(u, start, chance):
     """Stretch what is left of a random number after a choice to [0, 1)."""
     return dr.clip((u - start) / dr.maximum(chance, TINY), 0, ONE_BELOW)
-
-
-def conflict(first: set[str], second: set[str], why: str = "give one or the other") -> None:
-    """Raise ParameterError if both sets have members."""
-    if first and second:
-        raise ParameterError(f"{min(first)} and {min(second)} exclude each other: {why}.")

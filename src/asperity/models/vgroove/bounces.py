@@ -1,0 +1,35 @@
+"""How many bounces matter: at most ceil(pi / v) happen in a groove of aperture v (Lee et al. 2018, Eq. 4, Table 2)."""
+
+from __future__ import annotations
+
+import math
+
+from ...microfacet.quadrature import gauss_legendre
+
+LOST = 1e-3
+"""Share of the ground whose grooves may need more bounces than the default of max_bounces."""
+
+
+def needed_bounces(distribution, alpha: float, lost: float = LOST) -> int:
+    """Bounces that suffice in all symmetric grooves but the steepest, a share ``lost``."""
+    return math.ceil(math.pi / (2 * math.atan(1 / distribution.slope(alpha, lost))))
+
+
+def needed_bounces_nonsymmetric(distribution, alpha: float, lost: float = LOST) -> int:
+    """The same for facets of independent tilts, of which both are seldom steep; never more than of symmetric ones."""
+    n, most = 2, needed_bounces(distribution, alpha, lost)
+    while n < most and narrow(distribution, alpha, math.pi / n) > lost:
+        n += 1
+    return min(n, most)
+
+
+def narrow(distribution, alpha: float, aperture: float, nodes: int = 24) -> float:
+    """Share of the ground that is grooves narrower than ``aperture`` <= pi/2, of facets of independent tilts."""
+    total = 0.0
+    for x, weight in zip(*gauss_legendre(nodes)):
+        for y, other in zip(*gauss_legendre(nodes)):
+            v = aperture * x
+            (sin_l, cos_l), (sin_r, cos_r) = ((math.cos(b), math.sin(b)) for b in (v * y, v * (1 - y)))
+            by_ground = 2 * math.pi * distribution.density(alpha, sin_l, cos_l) * sin_l * cos_l
+            total += weight * other * v * by_ground * distribution.density(alpha, sin_r, cos_r) * sin_r**2
+    return aperture * total / distribution.partner(alpha)

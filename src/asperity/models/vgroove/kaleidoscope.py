@@ -1,0 +1,125 @@
+"""Light in a V-groove, unfolded: a ray goes straight through a fan of mirror images of the two facets.
+
+In the plane across a groove, angles are from the surface's normal n, positive towards the horizontal direction t, and
+a direction of length ``l`` in that plane has the angle psi. The facet that light meets first, L, tilts towards t by
+``tilt_l``; the other, R, away from t by ``tilt_r``; grooves have depth 1. Met at the m-th mirror image, x_m is the
+angle between the ray and that image. Equations of Lee et al. 2018, whose angles are of the opposite sign, with the
+clamps that they need.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+
+
+class Groove(NamedTuple):
+    """The tilts of a groove's two facets, in (0, pi/2)."""
+
+    tilt_l: Any
+    tilt_r: Any
+
+    @property
+    def aperture(self):
+        """Angle between the facets, theta_v."""
+        return dr.pi - self.tilt_l - self.tilt_r
+
+    def swapped(self, swap) -> Groove:
+        """The same groove, seen from the other side where ``swap``."""
+        return Groove(dr.select(swap, self.tilt_r, self.tilt_l), dr.select(swap, self.tilt_l, self.tilt_r))
+
+
+def meeting_angle(groove: Groove, psi, m):
+    """x_m, between the ray and the m-th mirror image; m = 0 is R, before L."""
+    return psi + dr.pi / 2 - groove.tilt_l + (m - 1) * groove.aperture
+
+
+def reach(groove: Groove, psi, m):
+    """f_m: offset from the apex up to which rays reflect at the m-th image; f_0 bounds the shadow (Eq. 6, 9).
+
+    Zero, like the length seen, where the ray runs away from the image.
+    """
+    x, odd = meeting_angle(groove, psi, m), m % 2 == 1
+    tilt = dr.select(odd, groove.tilt_l, groove.tilt_r)
+    return dr.select(x < dr.pi, dr.sin(x) * dr.rcp(dr.sin(tilt)), 0)
+
+
+def leaving_share(groove: Groove, psi, k: int):
+    """G_k: share of L's area facing the light from which it leaves after k bounces; they add up to G1 (Eq. 6, 9)."""
+    first, shadow = reach(groove, psi, 1), dr.maximum(reach(groove, psi, 0), 0)
+    last = first
+    for m in {2, k - 1, k} & set(range(2, k + 1)):  # the sine is concave: no other image can be the narrowest
+        last = dr.minimum(last, reach(groove, psi, m))
+    lit = dr.maximum(last - dr.maximum(dr.minimum(last, reach(groove, psi, k + 1)), shadow), 0)
+    return dr.select(first > 0, lit / dr.select(first > 0, first, 1), 0)
+
+
+def exit_angle(groove: Groove, psi, k):
+    """Angle of the direction in which light leaves after k bounces (Eq. 5, 8)."""
+    v = groove.aperture
+    return dr.select(k % 2 == 1, 2 * groove.tilt_l - psi - (k - 1) * v, psi - dr.pi + k * v)
+
+
+def bounces(groove: Groove, psi, offset, most):
+    """Number of bounces of the ray at this offset from the apex, at least 1; ``most`` + 1 stands for more."""
+
+    def reflects(k):  # again, after k bounces
+        return (k <= most) & (offset <= reach(groove, psi, k + 1)) & (meeting_angle(groove, psi, k + 1) < dr.pi)
+
+    UInt = dr.uint32_array_t(type(psi))
+    (k,) = dr.while_loop((UInt(1),), reflects, lambda k: (k + 1,))
+    return k
+
+
+def symmetric_bounces(groove: Groove, psi, offset, most):
+    """The same for facets of equal tilt, in closed form."""
+    UInt, half_aperture = dr.uint32_array_t(type(psi)), groove.aperture / 2
+    x = dr.pi - psi - half_aperture - dr.asin(dr.clip(offset * dr.sin(groove.tilt_l), -1, 1))
+    k = dr.ceil(x / dr.maximum(2 * half_aperture, 1e-6))
+    return UInt(dr.clip(k, 1, type(psi)(most) + 1))
+
+
+def entrance(groove: Groove, psi, u):
+    """(offset, swap): a ray's offset from the apex, uniform over the opening, and whether the ray meets R first.
+
+    R is L of the mirrored groove, in which the ray's angle is -psi. ``u`` is in [0, 1).
+    """
+    left = dr.cos(psi - groove.tilt_l) / dr.maximum(dr.sin(groove.tilt_l), 1e-6)
+    right = dr.cos(psi + groove.tilt_r) / dr.maximum(dr.sin(groove.tilt_r), 1e-6)
+    offset = dr.lerp(left, -right, u)
+    return dr.abs(offset), offset < 0
+
+
+class Pair(NamedTuple):
+    """Two directions in the plane of their half vector h and the normal, with all that their BRDF depends on.
+
+    ``theta`` is half the sum of their angles there, which is h's, ``delta`` half the difference, without its sign.
+    """
+
+    cos_azimuth: Any  # of h: the direction t across the grooves that may join the two
+    sin_azimuth: Any
+    theta: Any
+    sin_theta: Any
+    cos_theta: Any
+    delta: Any
+    sin_delta: Any
+    cos_delta: Any
+    length: Any  # of both directions in that plane, l
+
+    @classmethod
+    def of(cls, i, o) -> Pair:
+        """The pair of two unit vectors above the surface."""
+        h = i + o
+        flat = dr.square(h.x) + dr.square(h.y)
+        defined = flat > 1e-14
+        flat = dr.sqrt(dr.select(defined, flat, 1))
+        x, y = dr.select(defined, h.x / flat, 1), dr.select(defined, h.y / flat, 0)
+        flat = dr.select(defined, flat, 0)
+        norm = dr.sqrt(dr.square(flat) + dr.square(h.z))  # 2 l cos delta
+        sin, cos = flat / norm, h.z / norm
+        across = ((i.x - o.x) * x + (i.y - o.y) * y) * cos - (i.z - o.z) * sin
+        across = dr.abs(across)  # 2 l sin delta
+        double = dr.sqrt(dr.square(across) + dr.square(norm))
+        delta = dr.atan2(across, norm)
+        return cls(x, y, dr.atan2(flat, h.z), sin, cos, delta, across / double, norm / double, double / 2)

@@ -1,0 +1,68 @@
+"""Grooves one can hit, as the ground truth of the model: every ray meets one of its own."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ...errors import ParameterError
+from ...goniophotometer.grooves import Grooves, Shape
+from ...goniophotometer.tile import opaque
+from ...microfacet.distributions import DISTRIBUTIONS, Profile, sample_azimuth
+
+
+@dataclass(frozen=True)
+class ExplicitGrooves:
+    """V-grooves whose facets follow a distribution of normals, their openings side by side in one plane.
+
+    ``symmetric`` grooves have facets of equal tilt; else the tilts are independent (Lee et al. 2018, Eq. 20).
+    ``facet`` is the description of a BSDF.
+    """
+
+    distribution: str = "ggx"
+    alpha_u: float = 0.3
+    alpha_v: float = 0.3
+    symmetric: bool = True
+    facet: dict[str, Any] = field(default_factory=lambda: {"type": "conductor", "material": "none"})
+
+    def __post_init__(self):
+        for name in ("alpha_u", "alpha_v"):
+            alpha = getattr(self, name)
+            if not (isinstance(alpha, int | float) and alpha > 0):
+                raise ParameterError(
+                    f"{name} = {alpha!r}: simulated grooves are alike everywhere; expected one number above 0."
+                )
+
+    @classmethod
+    def of(cls, model: dict[str, Any], given: set[str]) -> ExplicitGrooves:
+        """The grooves that a ``vgroove`` BSDF models; of its parameters the scene has ``given`` some itself."""
+        for name in {"reflectivity", "edge_tint"} & given:
+            raise ParameterError(f"{name}: not simulated; give the metal by material, or by eta and k.")
+        alpha = float(np.sqrt(2 / (model["exponent"] + 2))) if "exponent" in given else model["alpha"]
+        alpha_u, alpha_v = (model[name] if name in given else alpha for name in ("alpha_u", "alpha_v"))
+        metal = {name: model[name] for name in {"material", "eta", "k"} & given} or {"material": "none"}
+        return cls(model["distribution"] or "ggx", alpha_u, alpha_v, model["symmetric"], {"type": "conductor"} | metal)
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """All of it."""
+        return {"type": "grooves"} | asdict(self)
+
+    def tile(self, rng: np.random.Generator) -> Grooves:
+        """Always the same; the grooves are drawn with the rays."""
+        return Grooves(self.draw, mi.load_dict(self.facet))
+
+    def draw(self, rng: mi.PCG32) -> Shape:
+        """Grooves by ground area: a facet with density D cos θ, and its partner."""
+        kind, (alpha_u, alpha_v) = DISTRIBUTIONS[self.distribution], opaque(mi.Point2f, self.alpha_u, self.alpha_v)
+        cos, sin = sample_azimuth(rng.next_float32(), alpha_u, alpha_v)
+        alpha = Profile.along(kind, cos, sin, alpha_u, alpha_v).alpha
+        first = dr.atan2(*kind.sample(alpha, rng.next_float32()))
+        if self.symmetric:
+            return Shape(mi.Vector2f(cos, sin), first, first)
+        partner = kind.sample_partner(alpha, *(rng.next_float32() for _ in range(3)))
+        return Shape(mi.Vector2f(cos, sin), first, dr.atan2(*partner))

@@ -1,0 +1,198 @@
+"""The BRDF of grooves whose facets have independent tilts, by fixed quadrature (Lee et al. 2018, Eq. 18 to 23).
+
+Terms are numbered as in `symmetric`, and with its P, Q and tau the light comes at the angle x = tau P + Q and goes at
+y = tau P - Q. Given the partner's tilt r, the tilt l of the facet that is met first follows from the number of bounces:
+
+    l = (2 tau P + (k - 1) (pi - r)) / (k + 1) for odd k,   l = pi - v - r, v = (pi - 2 tau P) / k for even k,
+    f cos_o = sum int D(l) sin l D(r) sin r g' J prod F dr / (4 C cos_i cos delta),   C = int D sin^2 r dr,
+    J = 1 / sin theta for k = 1, 2 / ((k + 1) sin theta) for odd, 2 / (k sin theta) for even k,
+
+g' = g sin l sin r being the width of the rays that leave after k bounces. C is wrong in the paper's appendix C.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import drjit as dr
+
+from ...microfacet.distributions import GGX, Beckmann, Phong, Profile
+from ...microfacet.quadrature import integrate
+from .fresnel import Metal, multiples, product, waves
+from .kaleidoscope import Pair
+from .symmetric import POLE, numbered, summed
+
+NODES = {GGX: (6, 4, 5), Beckmann: (12, 4, 8), Phong: (12, 4, 8)}
+"""For k = 1 and k = 2, in each piece between kinks, and for all others, whose share is small.
+
+A density has to be exact to .05 % or so: what its integral misses looks like lost samples. Tails of GGX are smoother.
+"""
+
+
+def nonsymmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None) -> tuple[Any, Any]:
+    """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``metal`` is None."""
+    pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
+    through = metal and waves(metal.logarithm, pair.length)
+
+    def terms(nodes, double):
+        def term(k, odd, tau):
+            p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
+            way = Way(k, odd, tau * p, q)
+            weight, mean, variance = moments(way, profile, nodes, double)
+            weight = weight * 2 * pole / dr.select(odd, k + 1, k)
+            if metal is None:
+                return (weight,)
+            # The product varies little over the grooves: one node, or two, of the Gauss rule for their distribution.
+            if not double:
+                return weight, weight * way.through(mean, through)
+            spread = dr.sqrt(dr.maximum(variance, 1e-12))
+            return weight, weight / 2 * (way.through(mean - spread, through) + way.through(mean + spread, through))
+
+        return term
+
+    few, double, multiple = NODES[profile.kind]
+    single, below = _single(pair, profile, few), limits(pair)
+    totals = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
+    totals = summed(totals, terms(double, True), *numbered(below, dr.minimum(most, type(most)(2))))
+    totals = summed(totals, terms(multiple, False), *numbered(below, most, lowest=(3, 3, 4, 4)))
+    scale = dr.rcp(4 * cos_i * pair.cos_delta * (profile.scale * profile.kind.partner(profile.alpha)))
+    return scale * totals[-1], scale * totals[0]
+
+
+def limits(pair: Pair):
+    """Numbers that k stays below, as in `symmetric`: where the intervals of integration become empty."""
+    theta, delta = pair.theta, pair.delta
+    # Of odd k, both first facets have the tilt l: f_0 < f_k is cos(y) cot(l) + cos(x) cot(r) > sin(x) - sin(y), and the
+    # cotangents are tangents of angles that add up to the aperture, at most (pi - 2 tau P) / (k - 1).
+    nearer = pair.cos_theta * pair.cos_delta + pair.sin_theta * pair.sin_delta
+    least = dr.maximum(dr.atan2(2 * pair.sin_delta * pair.cos_theta, nearer), 1e-6)
+
+    def odd(tau):
+        above = dr.pi - 2 * tau * theta
+        return dr.minimum(above / dr.maximum(delta - tau * theta, 1e-6) - 1, above / least + 1)
+
+    def even(tau):
+        below = theta if tau > 0 else theta + delta + dr.maximum(delta - theta, 0)
+        return (dr.pi - 2 * tau * delta) / dr.maximum(below, 1e-6)
+
+    return odd(1), odd(-1), even(1), even(-1)
+
+
+def _single(pair: Pair, profile: Profile, nodes: int):
+    """The integral of a single bounce, from a facet whose normal is the half vector.
+
+    Over t with tan r = alpha tan t, in which D varies evenly, and on either side of the tilt that begins to shade.
+    """
+    alpha, l = profile.alpha, (pair.sin_theta, pair.cos_theta)
+    x = dr.sincos(pair.theta + pair.delta)
+    shade = dr.atan2(x[1], alpha * x[0])
+
+    def at(node):
+        total = 0
+        for low, high in ((0, shade), (shade, dr.pi / 2)):
+            sin, cos = dr.sincos(low + (high - low) * node)
+            stretch = dr.rsqrt(dr.square(alpha * sin) + dr.square(cos))
+            r = alpha * sin * stretch, cos * stretch
+            f_0, f_1, _ = _reaches(x, l, r)
+            weight = profile.density(*r) * r[0] * dr.maximum(f_1 - dr.maximum(f_0, 0), 0)
+            total = total + (high - low) * alpha * dr.square(stretch) * weight
+        return (total,)
+
+    (integral,) = integrate(at, nodes, pair.theta)
+    return profile.density(*l) * integral
+
+
+class Way(NamedTuple):
+    """How light goes from x to y in k >= 2 bounces, through all grooves that lead there, one for each tilt r."""
+
+    k: Any
+    odd: Any
+    p: Any  # tau P
+    q: Any
+
+    def first_tilt(self, r):
+        """The tilt l."""
+        k, p = self.k, self.p
+        return dr.select(self.odd, (2 * p + (k - 1) * (dr.pi - r)) / (k + 1), dr.pi - (dr.pi - 2 * p) / k - r)
+
+    def interval(self):
+        """(least r, length): where both tilts are in (0, pi/2) and, as far as that is simple, the width is not 0."""
+        k, p, q, up = self.k, self.p, self.q, dr.pi / 2
+        x, y = p + q, p - q
+        v = (dr.pi - 2 * p) / k
+        low = dr.select(
+            self.odd, dr.pi - ((k + 1) * (up + dr.minimum(y, 0)) - 2 * p) / (k - 1), up - v - dr.minimum(x, 0)
+        )
+        high = dr.select(self.odd, dr.pi + 2 * p / (k - 1), dr.minimum(dr.pi - v, up - q + dr.minimum(p, 0)))
+        low, high = dr.maximum(low, 0), dr.minimum(high, up)
+        return low, dr.maximum(high - low, 0)
+
+    def kinks(self, low, high):
+        """The tilts r of k = 2 at which g' has a kink, in order, from ``low`` to ``high``.
+
+        With s = r - l + Q its terms are all sums of a constant and the cosine of one of (pi/2 + tau P) +- s.
+        """
+        p, q, up = self.p, self.q, dr.pi / 2
+        middle = (up + p - q) / 2  # f_1 = f_2
+        shaded, blocked = up - p - q, 2 * p - q  # f_0 > 0 beyond the one, f_3 > 0 before the other
+        cross = middle + dr.asin(dr.clip(-2 * dr.sin(p) * dr.sin(q), -1, 1)) / 2  # f_0 = f_3
+        overlap = blocked > shaded
+        a, b = dr.select(overlap, cross, blocked), dr.select(overlap, cross, shaded)
+        a, b, c = (dr.clip(kink, low, high) for kink in (middle, a, b))
+        small, large = dr.minimum(a, b), dr.maximum(a, b)
+        return low, dr.minimum(small, c), dr.maximum(small, dr.minimum(large, c)), dr.maximum(large, c), high
+
+    def widths(self):
+        """Function of (sin l, cos l) and (sin r, cos r): g', the width of the rays that leave after k bounces."""
+        x, y = dr.sincos(self.p + self.q), dr.sincos(self.p - self.q)
+
+        def width(l, r):
+            near, far = (tuple(dr.select(self.odd, a, b) for a, b in zip(*two)) for two in ((l, r), (r, l)))
+            f_0, f_1, f_2 = _reaches(x, l, r)
+            f_next, f_k, f_before = _reaches(y, near, far)
+            lit = dr.minimum(dr.minimum(f_1, f_2), dr.minimum(f_before, f_k))
+            return dr.maximum(lit - dr.maximum(dr.maximum(f_0, f_next), 0), 0)
+
+        return width
+
+    def through(self, r, e):
+        """Product of the reflectances in the groove with this r: u = Q and w = tau P, shifted by half r - l."""
+        l = self.first_tilt(r)
+        turn = (r - l) / 2
+        u = multiples(*dr.sincos(self.q + dr.select(self.odd, 0, turn)))
+        w = multiples(*dr.sincos(self.p + dr.select(self.odd, turn, 0)))
+        b = multiples(*dr.sincos((dr.pi - l - r) / 2))
+        bends = [c * d if n % 2 else -c * z for n, ((_, c), (z, d)) in enumerate(zip(u, w), 1)]
+        return product(e, self.k, self.odd, bends, [cos for _, cos in u], b)
+
+
+def moments(way: Way, profile: Profile, nodes: int, double: bool):
+    """(integral of D(l) sin l D(r) sin r g' over r, mean r, variance of r); ``double`` tells that k = 2."""
+    (low, extent), width = way.interval(), way.widths()
+    ends = way.kinks(low, low + extent) if double else (low, low + extent)
+
+    def at(node):
+        sums = [0, 0, 0]
+        for begin, end in pairwise(ends):
+            tilt = begin + (end - begin) * node
+            l, r = dr.sincos(way.first_tilt(tilt)), dr.sincos(tilt)
+            weight = (end - begin) * profile.density(*l) * l[0] * profile.density(*r) * r[0] * width(l, r)
+            sums = [sums[0] + weight, sums[1] + weight * tilt, sums[2] + weight * tilt * tilt]
+        return tuple(sums)
+
+    total, first, second = integrate(at, nodes, way.p)
+    mean, square = (moment / dr.select(total > 1e-15, total, 1) for moment in (first, second))
+    return total, mean, square - mean * mean
+
+
+def _reaches(x, near, far):
+    """f_0, f_1, f_2 times sin l sin r, of light that meets the ``near`` facet first; arguments are sines and cosines.
+
+    For y these are f_(k+1), f_k, f_(k-1): paths are reversible.
+    """
+    (sin_x, cos_x), (sin_near, cos_near), (sin_far, cos_far) = x, near, far
+    sin, cos = sin_x * cos_near - cos_x * sin_near, cos_x * cos_near + sin_x * sin_near  # of x - near
+    sin_sum, cos_sum = sin_near * cos_far + cos_near * sin_far, cos_near * cos_far - sin_near * sin_far
+    f_0 = -sin_near * (cos_x * cos_far - sin_x * sin_far)
+    return f_0, sin_far * cos, -sin_near * (cos * cos_sum + sin * sin_sum)

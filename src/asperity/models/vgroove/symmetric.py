@@ -1,0 +1,126 @@
+"""The BRDF of grooves with equal facets, in closed form (Lee et al. 2018, Eq. 14 to 17).
+
+Terms are numbered by the bounces k and by the side tau, +1 if the facet met first tilts towards the half vector, else
+-1. With theta and delta of the `Pair`, and (P, Q) = (theta, delta) for odd k and (delta, theta) for even k, Eq. 14 to
+17 reduce to
+
+    f cos_o = sum D(pi/2 - b) g J prod F / (4 cos_i cos delta),   b = (pi/2 - tau P) / k,
+    g = max(0, min(sin(b + tau P - Q), 2 cos P sin(b - Q))),   J = cos b / (k sin theta), or 1 if k = 1,
+
+where b is half the groove's aperture. g > 0 if k < (pi/2 - tau P) / (Q, or P + Q for tau = -1): few terms remain,
+except near the mirror direction.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+
+from ...microfacet.distributions import Profile
+from .fresnel import Metal, multiples, product, waves
+from .kaleidoscope import Pair
+
+POLE = 1e-4
+"""Least sin theta: strictly parallel facets make a pole in the mirror direction. What is cut off holds 2e-4 of the
+energy of GGX with alpha 1, and less of others."""
+
+
+def symmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None) -> tuple[Any, Any]:
+    """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``metal`` is None."""
+    pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
+    share, through = _Share(pair), metal and _Through(pair, metal)
+
+    def term(k, odd, tau):
+        b = (dr.pi / 2 - tau * dr.select(odd, pair.theta, pair.delta)) / k
+        sin, cos = dr.sincos(b)
+        value = pole * cos / k * profile.density(cos, sin) * share(odd, tau, sin, cos)
+        return (value,) if metal is None else (value, value * through(k, odd, tau, sin, cos))
+
+    single = profile.density(pair.sin_theta, pair.cos_theta) * cook_torrance_share(pair)
+    start = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
+    totals = summed(start, term, *numbered(limits(pair), most))
+    scale = dr.rcp(4 * cos_i * pair.cos_delta)
+    return scale * totals[-1], scale * totals[0]
+
+
+def summed(totals, term, count, term_of) -> tuple:
+    """``totals``, and the terms that `numbered` counts, in a recorded loop."""
+
+    def add(index, sums):
+        return index + 1, tuple(total + one for total, one in zip(sums, term(*term_of(index))))
+
+    # -1: Dr.Jit then differentiates a sum backwards without storing its terms, if it starts from constants.
+    start = type(count)(0), tuple(0 * dr.detach(total) for total in totals)
+    _, sums = dr.while_loop(start, lambda index, _: index < count, add, max_iterations=-1)
+    return tuple(total + more for total, more in zip(totals, sums))
+
+
+def cook_torrance_share(pair: Pair):
+    """g of a single bounce: cos delta times the V-cavity's masking (Cook and Torrance 1982)."""
+    beyond = pair.cos_theta * pair.cos_delta - pair.sin_theta * pair.sin_delta  # cos of the steeper direction
+    return dr.maximum(dr.minimum(pair.cos_delta, 2 * pair.cos_theta * beyond), 0)
+
+
+def limits(pair: Pair):
+    """Numbers that k stays below, for (odd, tau = 1), (odd, -1), (even, 1), (even, -1)."""
+    theta, delta, both = pair.theta, pair.delta, pair.theta + pair.delta
+    half = dr.pi / 2
+    ranges = (half - theta, delta), (half + theta, both), (half - delta, theta), (half + delta, both)
+    return [above / dr.maximum(below, 1e-6) for above, below in ranges]
+
+
+def numbered(limits, most, lowest=(3, 3, 2, 2)):
+    """(n, f): how many terms have k from ``lowest`` to ``most`` and below the `limits`, and f(0..n-1) = (k, odd, tau).
+
+    Without gaps: in a loop over them no lane waits for others to find out that a term is empty.
+    """
+    Float, UInt = type(limits[0]), type(most)
+    ends, end = [], UInt(0)
+    for below, first in zip(limits, lowest):
+        beyond = UInt(dr.ceil(dr.minimum(dr.detach(below), Float(most) + 1)))
+        end = end + dr.select(beyond > first, (beyond + 1 - first) // 2, 0)
+        ends.append(end)
+
+    def term(index):
+        later = [index >= end for end in ends[:3]]
+        begin = dr.select(later[0], dr.select(later[1], dr.select(later[2], ends[2], ends[1]), ends[0]), 0)
+        odd = index < ends[1]
+        tau = dr.select(dr.select(odd, later[0], later[2]), Float(-1), Float(1))
+        return 2 * (index - begin) + dr.select(odd, UInt(lowest[0]), UInt(lowest[2])), odd, tau
+
+    return ends[3], term
+
+
+class _Share:
+    """g of k >= 2; without trigonometric functions of its own, and without cancellation where it is small."""
+
+    def __init__(self, pair: Pair):
+        self.sums = pair.cos_theta * pair.cos_delta, pair.sin_theta * pair.sin_delta
+        self.sines = pair.sin_theta * pair.cos_delta, pair.cos_theta * pair.sin_delta
+        self.pair = pair
+
+    def __call__(self, odd, tau, sin, cos):
+        pair, (a, b) = self.pair, self.sums
+        p, q = dr.select(odd, self.sines[0], self.sines[1]), dr.select(odd, self.sines[1], self.sines[0])
+        lit = sin * (a + tau * b) + cos * (tau * p - q)  # sin(b + tau P - Q)
+        sin_q, cos_q = dr.select(odd, pair.sin_delta, pair.sin_theta), dr.select(odd, pair.cos_delta, pair.cos_theta)
+        cos_p = dr.select(odd, pair.cos_theta, pair.cos_delta)
+        return dr.maximum(dr.minimum(lit, 2 * cos_p * (sin * cos_q - cos * sin_q)), 0)
+
+
+class _Through:
+    """The product of the reflectances: u = Q and w = tau P, the same for all k of a parity."""
+
+    def __init__(self, pair: Pair, metal: Metal):
+        self.waves = waves(metal.logarithm, pair.length)
+        theta, delta = multiples(pair.sin_theta, pair.cos_theta), multiples(pair.sin_delta, pair.cos_delta)
+        self.tops = [(d, t) for (_, t), (_, d) in zip(theta, delta)]
+        self.bends = [
+            (d * t, d * t) if n % 2 else (-d * z, -t * y) for n, ((z, t), (y, d)) in enumerate(zip(theta, delta), 1)
+        ]
+
+    def __call__(self, k, odd, tau, sin, cos):
+        bends = [(1 if n % 2 else tau) * dr.select(odd, *bend) for n, bend in enumerate(self.bends, 1)]
+        tops = [dr.select(odd, *top) for top in self.tops]
+        return product(self.waves, k, odd, bends, tops, multiples(sin, cos))

@@ -1,0 +1,26 @@
+"""The short version of `asperity validate lambertsphere`, and that it can fail."""
+
+import pytest
+
+from asperity.validation import lambertsphere, report
+
+pytestmark = pytest.mark.usefixtures("rgb")
+SHORT = report.Effort(2e5, 12)
+
+
+@pytest.mark.parametrize(
+    "section", [lambertsphere.phase_function, lambertsphere.brdf, lambertsphere.energy, lambertsphere.slab]
+)
+def test_section(section):
+    found = section(SHORT)
+    assert found.findings and all(finding.passed for finding in found.findings), found.findings
+
+
+@pytest.mark.parametrize("wrong", [{"albedo": 0.83}, {"variant": "fast"}, {"type": "chandrasekhar"}])
+def test_a_wrong_model_fails(wrong):
+    description = lambertsphere.spheres(0.8)
+    truth = lambertsphere.walked(0.8, report.Effort(2e6, 32))
+    for change, verdict in (({}, True), (wrong, False)):
+        model = lambertsphere.modelled(description | change)
+        finding = report.agreement("", truth, model, 32, lambertsphere.REFIT)
+        assert finding.passed is verdict, (change, finding)
