@@ -60,8 +60,8 @@ def no_plugin(name: str) -> str:
     """What to say about a plugin that nobody has."""
     import mitsuba as mi
 
-    from asperity.models import MODELS, TEXTURES
+    from asperity.models import MODELS, PHASES, TEXTURES
 
     mitsubas = (path.stem.removeprefix("lib") for path in (Path(mi.__file__).parent / "plugins").iterdir())
-    nearest = get_close_matches(name, [*MODELS, *TEXTURES, *mitsubas], n=1)
+    nearest = get_close_matches(name, [*MODELS, *TEXTURES, *PHASES, *mitsubas], n=1)
     return f"there is no plugin {name!r}." + (f" Did you mean {nearest[0]!r}?" if nearest else "")

@@ -12,15 +12,16 @@ from .registry import about, models
 
 def list_all() -> None:
     """List the models, and the presets that show them."""
-    from asperity.models import TEXTURES
+    from asperity.models import PHASES, TEXTURES
     from asperity.scenes import presets
 
     out = console.stdout()
     table = Table("model", "what it models", "source")
     for name, model in models().items():
         table.add_row(name, about(model).split("\n\n")[0], " ".join(re.findall(r"doi\s*=\s*\{(.*?)\}", model.citation)))
-    for name, texture in TEXTURES.items():
-        table.add_row(name, about(texture).split("\n\n")[0], "a texture")
+    for kind, plugins in (("a texture", TEXTURES), ("a phase function", PHASES)):
+        for name, plugin in plugins.items():
+            table.add_row(name, about(plugin).split("\n\n")[0], kind)
     out.print(table)
 
     table = Table("preset", "title", "source")

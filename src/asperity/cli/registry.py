@@ -23,12 +23,12 @@ def model(name: str) -> Any:
 
 
 def described(name: str) -> Any:
-    """The model or the texture of that name."""
-    from asperity.models import TEXTURES
+    """The model, texture or phase function of that name."""
+    from asperity.models import PHASES, TEXTURES
 
-    known = models() | TEXTURES
+    known = models() | TEXTURES | PHASES
     if name not in known:
-        raise UnknownNameError("model, texture or preset", name, known)
+        raise UnknownNameError("model, texture, phase function or preset", name, known)
     return known[name]
 
 

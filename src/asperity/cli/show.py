@@ -10,7 +10,7 @@ from rich.table import Table
 
 from . import console, registry
 
-Name = Annotated[str, typer.Argument(metavar="NAME", help="A model, texture or preset that `asperity list` shows.")]
+Name = Annotated[str, typer.Argument(metavar="NAME", help="What `asperity list` shows: a model, a preset.")]
 
 
 def show(name: Name) -> None:

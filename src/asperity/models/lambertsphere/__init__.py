@@ -4,6 +4,8 @@ d'Eon, "An analytic BRDF for materials with spherical Lambertian scatterers", 20
 Transfer", 1960.
 """
 
+from .microgeometry import ExplicitSpheres as ExplicitSpheres
+from .microgeometry import RandomWalk as RandomWalk
 from .model import Chandrasekhar as Chandrasekhar
 from .model import LambertSphere as LambertSphere
 from .model import LambertSpherePhase as LambertSpherePhase

@@ -12,6 +12,7 @@ import numpy as np
 from ...errors import ParameterError
 from ...goniophotometer.medium import HalfSpace
 from ...goniophotometer.tile import Tile
+from .transport import root
 
 
 class Sphere:
@@ -56,6 +57,21 @@ class RandomWalk:
 
     def __post_init__(self):
         _check_albedo(self.albedo)
+
+    @classmethod
+    def of(cls, model: dict[str, Any], given: set[str]) -> RandomWalk:
+        """The half space that a ``lambertsphere`` BSDF models; of its parameters the scene has ``given`` some."""
+        name = "albedo" if "albedo" in given else "reflectance"
+        colour = model[name]
+        if isinstance(colour, dict) and colour.get("type") == "rgb":
+            colour = colour["value"]
+        values = np.atleast_1d(colour)
+        if values.dtype.kind not in "fi":
+            raise ParameterError(f"{name} = {model[name]!r}: not simulated; give one number, or an RGB colour.")
+        if name == "reflectance":
+            values = np.array([1 - root(float(value)) ** 2 for value in values])
+        first, *others = map(float, values)
+        return cls((first, *others) if others else first)  # type: ignore[arg-type]  # three of them, as is checked
 
     @property
     def description(self) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import mitsuba as mi
 from ...microfacet.albedo import directional_albedo
 from ...parameters import Choice, Colour, Declared, conflict
 from . import transport
+from .microgeometry import RandomWalk
 from .transport import Pair
 
 CITATION = """\
@@ -66,9 +67,9 @@ class HalfSpace(Declared):
 
     def sample(self, ctx, si, sample1, sample2, active):
         """Directions and densities carry no gradient: derivatives are those of the value at a fixed direction."""
-        retro = sample1 < self._chance(si.wi, self._root(si, active))
-        wo = spherical(dr.select(retro, -self.draw(sample2.x), dr.sqrt(1 - sample2.x)), sample2.y)
-        wo = dr.select(retro, mi.Frame3f(si.wi).to_world(wo), wo)
+        once = sample1 < self._chance(si.wi, self._root(si, active))
+        wo = spherical(dr.select(once, -self.draw(sample2.x), dr.sqrt(1 - sample2.x)), sample2.y)
+        wo = dr.select(once, mi.Frame3f(si.wi).to_world(wo), wo)
         bs = dr.zeros(mi.BSDFSample3f)
         bs.wo = dr.detach(mi.Vector3f(wo.x, wo.y, dr.abs(wo.z)))
         bs.eta, bs.sampled_type = 1, mi.UInt32(self.components()[0])
@@ -104,6 +105,12 @@ class LambertSphere(HalfSpace):
 
     lobe = staticmethod(transport.lobe)
     draw = staticmethod(transport.sample_lobe)
+
+    @classmethod
+    def microgeometry(cls, description: dict[str, Any]) -> RandomWalk:
+        """The random walk between spheres that a scene's description of this BSDF stands for."""
+        mi.load_dict(description, parallel=False)  # complains of what is wrong with it
+        return RandomWalk.of(cls.defaults() | description, set(description))
 
     def root(self, bond):
         """With the published fits, the published map."""
