@@ -4,6 +4,7 @@ import asperity  # noqa: F401  isort: skip
 import pytest
 
 from asperity.lab import checks
+from asperity.lab.checks import results
 from asperity.models import MODELS
 
 WHITE = {"type": "diffuse", "reflectance": 0.9}
@@ -77,6 +78,7 @@ SPREAD = {
     },
 }
 SLOW_TO_DIFFERENTIATE = {"by height", "coated", "diffuse anisotropic", "glass base", "multiple diffuse"}
+SLOW_TO_DIFFERENTIATE |= {"non-symmetric beckmann", "non-symmetric phong"}  # "non-symmetric" is checked
 """Their derivatives unroll the quadrature: half a minute of compiling each. `asperity check` has no such exception."""
 
 CASES = [(model, case) for model, cases in SPREAD.items() for case in cases]
@@ -87,8 +89,10 @@ def test_every_model_is_here():
 
 
 @pytest.mark.parametrize("model, case", CASES, ids=[f"{model}-{case}" for model, case in CASES])
-def test_invariants(rgb, model, case):
+def test_invariants(rgb, monkeypatch, model, case):
+    # A check rejects a right BSDF once in 100; this whole suite of them may do so once in 100, too.
+    monkeypatch.setattr(results, "SIGNIFICANCE", results.SIGNIFICANCE / len(CASES))
     names = [name for name in checks.NAMES if not (name == "gradients" and case in SLOW_TO_DIFFERENTIATE)]
-    results = checks.check({"type": model, **SPREAD[model][case]}, only=names)
-    failed = [f"{r.name}: {r.measured} (bound: {r.bound})" for r in results if r.passed is False]
+    found = checks.check({"type": model, **SPREAD[model][case]}, only=names)
+    failed = [f"{r.name}: {r.measured} (bound: {r.bound})" for r in found if r.passed is False]
     assert not failed, "\n".join(failed)
