@@ -55,27 +55,30 @@ class Effort(NamedTuple):
     seed: int = 0
 
 
-def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float) -> Finding:
+def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float | np.ndarray) -> Finding:
     """Whether all numbers of a model lie within the truth's standard errors, and a relative ``tolerance`` of its own.
 
     Standard errors come from ``tiles`` tiles, so deviations follow Student's t with one degree of freedom less.
     Numbers that were measured to worse than a tenth are too few hits for that: they are compared as one, by their sum.
     """
-    value, error, model = (np.ravel(a).astype(float) for a in (*truth, np.broadcast_to(model, truth.value.shape)))
+    shape = truth.value.shape
+    value, error, model, allowed = (
+        np.ravel(np.broadcast_to(a, shape)).astype(float) for a in (*truth, model, tolerance * np.abs(model))
+    )
     good = error < 0.1 * np.abs(value)
     if not good.any():
         raise ValueError(f"{claim}: nothing was measured to a tenth; more paths are needed")
-    gap = np.maximum(np.abs(value - model) - tolerance * np.abs(model), 0)[good]
+    gap = np.maximum(np.abs(value - model) - allowed, 0)[good]
     limit = float(stats.t.isf((1 - (1 - SIGNIFICANCE) ** (1 / (CLAIMS * good.sum()))) / 2, tiles - 1))
     worst = float(np.max(gap / error[good]))
     # Errors of cells are all but independent; if they were not, their sum's would be at most the sum of theirs.
-    rest = abs(value[~good].sum() - model[~good].sum()) - tolerance * model[~good].sum()
+    rest = abs(value[~good].sum() - model[~good].sum()) - allowed[~good].sum()
     rest_limit = limit * np.sqrt(np.square(error[~good]).sum()) + 1e-4 * model.sum()
     mean = np.average(np.abs(value - model)[good] / np.abs(model[good]), weights=model[good])
     return Finding(
         claim,
         f"mean error {mean:.2%} in {good.sum()} numbers; worst {worst:.1f} standard errors",
-        f"{limit:.1f} standard errors beyond {tolerance:.1%}",
+        f"{limit:.1f} standard errors beyond {np.max(tolerance):.2%}",
         bool(worst <= limit and rest <= rest_limit),
     )
 
