@@ -73,18 +73,7 @@ def _bsdf(model_class: Any, variant: str) -> type:
                 return _depolarise(self.model.directional_albedo(si, active))
             return _depolarise(directional_albedo(self.model.sample, si, active, ALBEDO_SAMPLES))
 
-        def traverse(self, callback: mi.TraversalCallback) -> None:
-            for name, child in self.model.children().items():
-                constant = name in self.model.constant
-                callback.put(name, child, mi.ParamFlags.NonDifferentiable if constant else mi.ParamFlags.Differentiable)
-
-        def parameters_changed(self, keys: list[str]) -> None:
-            self.model.check()
-            self.model.update()
-
-        def to_string(self) -> str:
-            children = (f"  {name} = {child}".replace("\n", "\n  ") for name, child in self.model.children().items())
-            return f"{model_class.__name__}[\n" + ",\n".join(children) + "\n]"
+        traverse, parameters_changed, to_string = _traverse, _parameters_changed, _to_string
 
     Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
     return Plugin
@@ -116,15 +105,7 @@ def _texture(model_class: Any, variant: str) -> type:
         def is_spatially_varying(self) -> bool:
             return True
 
-        def parameters_changed(self, keys: list[str]) -> None:
-            self.model.check()
-
-        def traverse(self, callback: mi.TraversalCallback) -> None:
-            for name, child in self.model.children().items():
-                callback.put(name, child, mi.ParamFlags.Differentiable)
-
-        def to_string(self) -> str:
-            return f"{model_class.__name__}[]"
+        traverse, parameters_changed, to_string = _traverse, _parameters_changed, _to_string
 
     Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
     return Plugin
@@ -150,18 +131,26 @@ def _phase(model_class: Any, variant: str) -> type:
             wo, weight, pdf = self.model.sample(ctx, mei, sample1, sample2, active)
             return wo, _depolarise(weight), pdf
 
-        def parameters_changed(self, keys: list[str]) -> None:
-            self.model.check()
-
-        def traverse(self, callback: mi.TraversalCallback) -> None:
-            for name, child in self.model.children().items():
-                callback.put(name, child, mi.ParamFlags.Differentiable)
-
-        def to_string(self) -> str:
-            return f"{model_class.__name__}[]"
+        traverse, parameters_changed, to_string = _traverse, _parameters_changed, _to_string
 
     Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
     return Plugin
+
+
+def _traverse(self: Any, callback: mi.TraversalCallback) -> None:
+    for name, child in self.model.children().items():
+        constant = name in self.model.constant
+        callback.put(name, child, mi.ParamFlags.NonDifferentiable if constant else mi.ParamFlags.Differentiable)
+
+
+def _parameters_changed(self: Any, keys: list[str]) -> None:
+    self.model.check()
+    self.model.update()
+
+
+def _to_string(self: Any) -> str:
+    children = (f"  {name} = {child}".replace("\n", "\n  ") for name, child in self.model.children().items())
+    return f"{type(self.model).__name__}[\n" + ",\n".join(children) + "\n]"
 
 
 def _depolarise(value: Any) -> Any:
