@@ -52,8 +52,8 @@ class Triangulated:
     def tile(self, rng: np.random.Generator) -> Tile:
         """Always the same tile, built when it is first asked for, of the variant that is then in use.
 
-        It is scaled by a power of two, so that the unit of length cannot matter: its larger side is in [1, 2). Rays were
-        seen to miss triangles with edges of 3e-10.
+        It is scaled by a power of two, so that the unit of length cannot matter: its larger side is in [1, 2). Rays
+        were seen to miss triangles with edges of 3e-10.
         """
         return self._tile
 
