@@ -63,7 +63,10 @@ def measure(
     result = _empty(geometry, incident, sensor, settings, tiles, seed, about or {})
     if before is not None:
         result = _continued(before, result)
-    quota = -(-int(paths) // len(result.labels))
+    # Each path of a batch aims at one of the points: every point must get as many.
+    share = sensor.cells if isinstance(sensor, Points) else 1
+    quota = -(-int(paths) // (len(result.labels) * share)) * share
+    batch = max(BATCH // share, 1) * share
     goal = result.paths + quota
     done, total = 0, quota * result.paths.size
     while done < total:
@@ -74,7 +77,7 @@ def measure(
             if isinstance(sensor, Points):
                 _check_facets(tile)
             for k, wi in enumerate(result.wi):
-                lanes = min(BATCH, int(goal[row, k] - result.paths[row, k]))
+                lanes = min(batch, int(goal[row, k] - result.paths[row, k]))
                 if lanes <= 0:
                     continue
                 stream = np.random.SeedSequence([int(tile_seed), int(number), k, int(result.paths[row, k])])
@@ -125,6 +128,8 @@ def _check(incident, orders, apart, paths, tiles, seed) -> None:
     ):
         if not (isinstance(value, int) and value >= least):
             raise ParameterError(f"{name} = {value!r}: expected a whole number, at least {least}.")
+    if seed >= 2**63:
+        raise ParameterError(f"seed = {seed}: expected a whole number below 2^63.")
     if not (np.isfinite(paths) and tiles <= paths <= 1e13):
         raise ParameterError(f"paths = {paths:g}: expected a number in [{tiles}, 1e13], one a tile at least.")
 

@@ -156,7 +156,7 @@ class Measurement:
             with np.load(path, allow_pickle=False) as file:
                 raw = {name: file[name] for name in ("incident", "labels", "paths", "energy")}
                 return Measurement(json.loads(str(file["about"])), **raw)
-        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
             raise UnreadableFileError("measurement", path, FORMATS, f"not written by asperity ({error})") from error
 
 

@@ -52,7 +52,7 @@ class Box:
 
     def enter(self, rng: mi.PCG32, corner: Any, lanes: int) -> mi.Point3f:
         """Points at the top, uniform over the window, in Z-order: what is near in the array is near on the surface."""
-        stride = 2**32 // lanes
+        stride = min(2**32 // lanes, 2**32 - 1)
         z_order = dr.arange(mi.UInt32, lanes) * stride + rng.next_uint32() % stride
         where = mi.Point2f(*(_every_second_bit(z_order >> k) for k in (0, 1)))
         where = (where + mi.Point2f(rng.next_float32(), rng.next_float32())) / 2**16

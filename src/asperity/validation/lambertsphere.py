@@ -228,7 +228,9 @@ def slab(effort: Effort) -> Section:
             },
         }
         loaded = mi.load_dict(scene, parallel=False)
-        runs = [float(np.array(mi.render(loaded, spp=samples // 16, seed=k))[0, 0, 0]) for k in range(16)]
+        runs = [
+            float(np.array(mi.render(loaded, spp=samples // 16, seed=16 * effort.seed + k))[0, 0, 0]) for k in range(16)
+        ]
         truth = Estimate(np.array([np.mean(runs)]), np.array([np.std(runs, ddof=1) / 4]))
         model = evaluate.cell_means(bsdf, wi, wo[None, None])[0] * wi[2] / wo[2]  # radiance for unit irradiance
         name = f"({theta}°, {phi}°) to ({out}°, {azimuth}°)"

@@ -107,7 +107,12 @@ def masking_by_azimuth(effort: Effort) -> Section:
     """Fig. 5: G1 over the azimuth of the normal is the distant term or, turned away, zero."""
     angles, tau_0, rows = [(64.5, 0.0)], 0.5, 28
     measured = measure_masking(
-        ExplicitGrains(tau_0), angles, sensor=Hemisphere(rows, 72), points=effort.paths, tiles=effort.tiles
+        ExplicitGrains(tau_0),
+        angles,
+        sensor=Hemisphere(rows, 72),
+        points=effort.paths,
+        tiles=effort.tiles,
+        seed=effort.seed,
     )
     ring = int((1 - np.cos(np.radians(50))) * rows)
     low, high = 1 - (ring + 1) / rows, 1 - ring / rows
@@ -155,7 +160,12 @@ def distant_masking(effort: Effort) -> Section:
     findings = []
     for tau_0 in (0.2, 0.5, 0.8):
         measured = measure_masking(
-            ExplicitGrains(tau_0), angles, sensor=Hemisphere(rows, 1), points=effort.paths / 4, tiles=effort.tiles
+            ExplicitGrains(tau_0),
+            angles,
+            sensor=Hemisphere(rows, 1),
+            points=effort.paths / 4,
+            tiles=effort.tiles,
+            seed=effort.seed,
         )
         grain = list(measured.parts).index("grains")
         truth = Estimate(*(part[:, grain] for part in measured.distant))
@@ -182,6 +192,7 @@ def pores(effort: Effort) -> Section:
             sensor=Hemisphere(1, 1),
             points=effort.paths / 4,
             tiles=effort.tiles,
+            seed=effort.seed,
         )
         truth = measured.visible("base")
         i, o = (to_sphere(evaluate.vectors(directions(ws)), beta_x, beta_y) for ws in zip(*pairs))
