@@ -35,6 +35,7 @@ def validate(
     if model not in PAPERS:
         raise UnknownNameError("model with a validation", model, PAPERS)
     folder = out or Path(f"asperity-validate-{model}")
+    folder.mkdir(parents=True, exist_ok=True)  # now, not after minutes of tracing
     start = time.perf_counter()
     paths, tiles = QUICK if quick else FULL
     table, found = Table("section", "claim", "measured", "bound", ""), []

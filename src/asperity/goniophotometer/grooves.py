@@ -33,7 +33,7 @@ class Grooves:
 
     def rays(self, wavelengths: tuple[float, ...]) -> GrooveRays:
         """The grooves for rays of these wavelengths."""
-        return GrooveRays(self, opaque(mi.Spectrum, *wavelengths) if mi.is_spectral else mi.Color0f())
+        return GrooveRays(self, opaque(mi.UnpolarizedSpectrum, *wavelengths) if mi.is_spectral else mi.Color0f())
 
     def facets(self) -> dict[str, mi.BSDF]:
         """Both are alike."""

@@ -23,7 +23,7 @@ class HalfSpace:
 
     def rays(self, wavelengths: tuple[float, ...]) -> Walk:
         """The half space for light of these wavelengths."""
-        return Walk(self.particle, opaque(mi.Spectrum, *wavelengths) if mi.is_spectral else mi.Color0f())
+        return Walk(self.particle, opaque(mi.UnpolarizedSpectrum, *wavelengths) if mi.is_spectral else mi.Color0f())
 
     def facets(self) -> dict[str, Any]:
         """All particles are alike."""

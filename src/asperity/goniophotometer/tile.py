@@ -48,7 +48,7 @@ class Box:
         self.window = opaque(mi.Point2f, min(tile.window, tile.width), min(tile.window, tile.depth))
         extent = max(tile.width, tile.depth, tile.top - tile.bottom)
         self.clearance = dr.opaque(mi.Float, CLEARANCE * extent)
-        self.wavelengths = opaque(mi.Spectrum, *wavelengths) if mi.is_spectral else mi.Color0f()
+        self.wavelengths = opaque(mi.UnpolarizedSpectrum, *wavelengths) if mi.is_spectral else mi.Color0f()
 
     def enter(self, rng: mi.PCG32, corner: Any, lanes: int) -> mi.Point3f:
         """Points at the top, uniform over the window, in Z-order: what is near in the array is near on the surface."""
