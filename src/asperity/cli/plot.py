@@ -28,8 +28,8 @@ def plot(
         measured = Measurement.load(file)
         description = measured.about.get("model") if model else None
         if description is not None:
-            nanometres = measured.about["channels"][0].endswith("nm")
-            variants.choose("llvm_ad_spectral" if nanometres else None)
+            first = measured.about["channels"][0]
+            variants.choose("llvm_ad_spectral" if first.endswith("nm") else "llvm_ad_mono" if first == "Y" else None)
         figure = plots.draw(measured, description)
         with atomically(out) as part:
             figure.savefig(part)
