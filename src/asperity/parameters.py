@@ -167,20 +167,19 @@ class Choice(Parameter):
     options: tuple[str, ...] = ()
     kind: ClassVar[str] = "choice"
 
+    def __post_init__(self):
+        object.__setattr__(self, "default", self.options[0])
+
     def allowed(self) -> str:
         """The words."""
         return ", ".join(self.options)
 
     def parse(self, props: mi.Properties) -> str:
         """The word, if it is one of the options."""
-        given = props.get(self.name, self.options[0])
+        given = props.get(self.name, self.default)
         if given not in self.options:
             raise ParameterError(f"{self.name} = {given!r}. {suggestion(str(given), self.options)}")
         return given
-
-    def rows(self) -> Iterable[Row]:
-        """The default is the first option."""
-        yield Row(self.name, self.kind, self.options[0], self.allowed(), "", self.meaning)
 
 
 @dataclass(frozen=True)

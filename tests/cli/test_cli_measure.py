@@ -145,7 +145,7 @@ BAD = [
     ((*GRAINS, "--theta", "95"), "theta = 95"),
     ((*GRAINS, "--theta", "abc"), "'abc': expected numbers"),
     ((*GRAINS, "--orders", "0"), "--orders"),
-    ((*GRAINS, "--paths", "1"), "paths = 1"),
+    ((*GRAINS, "--paths", "0"), "paths = 0"),
     ((*GRAINS, "--sensor", "retor"), "Did you mean 'retro'?"),
     ((*GRAINS, "--sensor", "points"), "towards"),
     ((*GRAINS, "--towards", "30"), "'30': expected directions"),

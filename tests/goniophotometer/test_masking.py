@@ -49,7 +49,11 @@ def test_pairs_are_symmetric_and_retro_is_masking_alone():
 
 @pytest.mark.parametrize(
     ("directions", "complaint"),
-    [(([],), "at least one"), (([(95, 0)],), "theta = 95"), (([(5, 0)], [(5, 0), (6, 0)]), "as many directions")],
+    [
+        (([],), "at least one direction"),
+        (([(95, 0)],), "theta = 95"),
+        (([(5, 0)], [(5, 0), (6, 0)]), "as many directions"),
+    ],
 )
 def test_clear_errors(directions, complaint):
     with pytest.raises(ParameterError, match=complaint):
@@ -66,3 +70,9 @@ def test_overhangs_are_refused():
 def test_spectral_variants_count_the_same():
     mi.set_variant("llvm_ad_spectral")
     assert measure_masking(ExplicitGrains(0.4), [(0, 0)], **WHOLE).seen.sum() == 2**19
+
+
+@pytest.mark.parametrize("wrong", [{"points": 0}, {"points": np.nan}, {"tiles": 0}, {"seed": -1}])
+def test_impossible_efforts(wrong):
+    with pytest.raises(ParameterError, match="expected a"):
+        measure_masking(ExplicitGrains(0.5), [(5, 0)], **WHOLE | wrong)

@@ -24,6 +24,7 @@ def t_limit(numbers, tiles):
     return stats.t.isf(0.0005 / numbers, tiles - 1)
 
 
+@pytest.mark.filterwarnings("ignore:theta = 89.9")  # a furnace is white however often its tile repeats
 @pytest.mark.parametrize("theta", [0.0, 60.0, 89.9])
 def test_white_furnace_is_exact(theta):
     # All facets return all light, and energy is counted in integers: not a unit may be missing.
@@ -189,7 +190,7 @@ def test_spectral_variants_measure_wavelengths():
         ({"incident": []}, "at least one direction"),
         ({"orders": 0}, "orders = 0"),
         ({"tiles": 1}, "tiles = 1"),
-        ({"paths": 1}, "paths = 1"),
+        ({"paths": 0.5}, "paths = 0.5"),
         ({"paths": np.inf}, "paths = inf"),
         ({"seed": -1}, "seed = -1"),
         ({"wavelengths": [500]}, "wavelengths"),
@@ -247,3 +248,21 @@ def test_light_along_the_surface_is_given_up():
     mi.register_bsdf("grazing", Grazing)
     measured = measure(ExplicitGrains(0.0, base={"type": "grazing"}), [(30, 0)], paths=64, tiles=2)
     assert measured.cut.value[0, 0] == 1 and measured.total_albedo.value[0, 0] == 0
+
+
+def test_every_point_gets_its_share_of_the_paths():
+    # 7 points and paths that are no multiple of 7: a flat white plane is known without noise, for order 1.
+    sensor = Points(tuple((10.0 * k, 30.0 * k) for k in range(7)))
+    flat = ExplicitGrains(0.0, grain=WHITE, base=WHITE)
+    measured = measure(flat, [(30, 0)], sensor=sensor, orders=1, paths=1000, tiles=4)
+    expected = np.cos(np.radians([10.0 * k for k in range(7)])) / np.pi
+    assert np.allclose(measured.summed.value[0, :, 0], expected, rtol=1e-4)
+
+
+def test_a_batch_of_one_path():
+    assert measure(ExplicitGrains(0.0, base=WHITE), [(30, 0)], paths=2, tiles=2).total_albedo.value[0, 0] == 1
+
+
+def test_a_tile_that_light_crosses_more_than_once():
+    with pytest.warns(UserWarning, match="crosses 1"):
+        measure(ExplicitGrains(0.5, grains=256), [(88.5, 0)], orders=1, **FEW)

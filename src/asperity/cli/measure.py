@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 import time
+import warnings
 from collections.abc import Collection
 from itertools import product
 from pathlib import Path
@@ -115,6 +116,10 @@ def measure(
         chosen = sensor_of(sensor, {"cells": cells, "radius": radius, "towards": towards})
         earlier = None if before is None else to_continue(before, tiles, seed)
     incident = list(product(theta, phi))
+    if tensor is not None:
+        from asperity.goniophotometer import tensor_file
+
+        tensor_file.grid(chosen, incident)  # complains now, not after the tracing
     given = {"tiles": tiles, "seed": seed, "wavelengths": wavelengths}
     start = time.perf_counter()
     with console.progress("million paths") as progress, passes.interruptible() as interrupted:
@@ -124,28 +129,29 @@ def measure(
             rate = f"{done / (time.perf_counter() - start):.2g} paths/s"
             progress.update(task, completed=round(done / 1e6, 1), total=round(total / 1e6, 1), description=rate)
 
-        measured = goniophotometer.measure(
-            geometry,
-            incident,
-            sensor=chosen,
-            orders=orders,
-            apart=apart,
-            paths=paths,
-            before=earlier,
-            about=about,
-            progress=show,
-            stop=lambda: bool(interrupted),
-            **{option: value for option, value in given.items() if value is not None},
-        )
+        with warnings.catch_warnings(record=True) as warned:
+            measured = goniophotometer.measure(
+                geometry,
+                incident,
+                sensor=chosen,
+                orders=orders,
+                apart=apart,
+                paths=paths,
+                before=earlier,
+                about=about,
+                progress=show,
+                stop=lambda: bool(interrupted),
+                **{option: value for option, value in given.items() if value is not None},
+            )
     seconds = time.perf_counter() - start
+    for warning in warned:
+        typer.echo(f"warning: {warning.message}", err=True)
     out = save(measured, out)
     report(measured)
     rate = (measured.total_paths - (earlier.total_paths if earlier else 0)) / seconds
     early = "stopped early: " if interrupted else ""
     typer.echo(f"{early}{out}: {measured.total_paths:.3g} paths, {seconds:.1f} s, {rate:.2g} paths/s")
     if tensor is not None:
-        from asperity.goniophotometer import tensor_file
-
         tensor_file.write(measured, tensor)
         typer.echo(tensor)
     typer.echo(f"Try next: asperity plot {out}")

@@ -21,7 +21,7 @@ def plot(
     model: Annotated[bool, typer.Option(help="Draw the model's own values as well, if it is a model's.")] = True,
 ) -> None:
     """Plot a measurement: maps, their errors, slices through the plane of incidence, and the albedo."""
-    out = writable(out or Path(f"{file.stem}.png"), FORMATS)
+    out = writable(out or file.with_suffix(".png"), FORMATS)
     with console.status("drawing"):
         from asperity.goniophotometer import Measurement, plots
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from asperity import __version__
 from asperity.errors import UnknownNameError
 
-from . import console, variants
+from . import console, passes, variants
 
 QUICK, FULL = (4e5, 16), (4e6, 32)
 """Paths per direction, and tiles."""
@@ -39,7 +39,7 @@ def validate(
     start = time.perf_counter()
     paths, tiles = QUICK if quick else FULL
     table, found = Table("section", "claim", "measured", "bound", ""), []
-    with console.status("measuring") as status:
+    with console.status("measuring") as status, passes.interruptible() as interrupted:
         for section in PAPERS[model](report.Effort(paths, tiles, seed)):
             found.append(section)
             status.update(f"measured: {section.title}")
@@ -47,14 +47,17 @@ def validate(
                 verdict, style = VERDICT[finding.passed]
                 row = (section.title if n == 0 else "", finding.claim, finding.measured, finding.bound)
                 table.add_row(*row, Text(verdict, style))
+            if interrupted:
+                break
+    early = "Stopped early. " if interrupted else ""
     seconds = time.perf_counter() - start
     preface = (
-        f"Made by `asperity validate {model}{' --quick' if quick else ''}`, asperity {__version__}: "
-        f"{paths:g} paths per direction through {tiles} random tiles, seed {seed}, {seconds:.0f} s. "
-        "Errors are standard errors over the tiles. The bounds are such that a right model fails a report with a "
-        "probability of 1 %."
+        f"{early}Made by `asperity validate {model}{' --quick' if quick else ''}`, asperity {__version__}, in "
+        f"{seconds:.0f} s: {paths:g} paths per direction (some sections take a quarter or eight times that) in {tiles} "
+        f"groups, seed {seed}. Each group has a tile of its own, where the surface is random. Errors are standard "
+        "errors over the groups. The bounds are such that a right model fails a report with a probability of 1 %."
     )
     path = report.write(f"`{model}` against its microgeometry", preface, found, folder)
     console.stdout().print(table)
-    typer.echo(f"{path}: {seconds:.0f} s")
-    raise typer.Exit(0 if report.passed(found) else 1)
+    typer.echo(f"{early}{path}: {seconds:.0f} s")
+    raise typer.Exit(0 if report.passed(found) and not interrupted else 1)

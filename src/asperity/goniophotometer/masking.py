@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import ParameterError
-from .measure import BATCH, PATHS, TILES
+from .measure import BATCH, PATHS, TILES, check_effort
 from .measurement import Estimate, estimate
 from .microgeometry import Microgeometry
 from .sensors import Hemisphere, Sensor, check_angles, directions
@@ -75,8 +75,9 @@ def measure_masking(
     """
     sensor = sensor or Hemisphere()
     pairs = list(zip(wi) if wo is None else zip(wi, wo))
-    if not pairs or len(wi) != len(pairs) or (wo is not None and len(wo) != len(wi)):
-        raise ParameterError(f"wo: expected as many directions as wi has ({len(wi)}), and at least one.")
+    check_effort(wi, points, tiles, seed)
+    if wo is not None and len(wo) != len(wi):
+        raise ParameterError(f"wo: expected as many directions as wi has ({len(wi)}).")
     for angles in pairs:
         check_angles(angles)
     if overhangs := getattr(geometry, "overhangs", 0):

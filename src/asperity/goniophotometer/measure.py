@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ from ..errors import ParameterError
 from .measurement import Measurement, check_alike
 from .microgeometry import Microgeometry, Piece
 from .sensors import Hemisphere, Points, Sensor, check_angles
-from .tile import VISIBLE
+from .tile import VISIBLE, Tile
 from .tracer import EXTRA, Settings, trace
 
 BATCH = 2**20
@@ -58,7 +59,10 @@ def measure(
     """
     sensor = sensor or Hemisphere()
     check_angles(incident)
-    _check(incident, orders, apart, paths, tiles, seed)
+    check_effort(incident, paths, tiles, seed)
+    for name, order in (("orders", orders), ("apart", apart)):
+        if order is not None:
+            _check_whole(name, order, 1)
     settings = Settings(orders or ENDLESS, min(apart, orders or apart), _wavelengths(wavelengths))
     result = _empty(geometry, incident, sensor, settings, tiles, seed, about or {})
     if before is not None:
@@ -76,6 +80,8 @@ def measure(
             tile = geometry.tile(np.random.default_rng([tile_seed, number]))
             if isinstance(sensor, Points):
                 _check_facets(tile)
+            if done == 0:
+                _warn_of_repetition(tile, result.incident)
             for k, wi in enumerate(result.wi):
                 lanes = min(batch, int(goal[row, k] - result.paths[row, k]))
                 if lanes <= 0:
@@ -117,21 +123,19 @@ def _continued(before: Measurement, fresh: Measurement) -> Measurement:
     return Measurement(before.about, before.incident, before.labels, before.paths.copy(), before.energy.copy())
 
 
-def _check(incident, orders, apart, paths, tiles, seed) -> None:
+def check_effort(incident: Sequence[Any], paths: float, tiles: int, seed: int) -> None:
+    """Raise ParameterError for numbers with which nothing can be measured."""
     if not incident:
         raise ParameterError("theta: expected at least one direction of incidence.")
-    for name, value, least in (
-        ("orders", 1 if orders is None else orders, 1),
-        ("apart", apart, 1),
-        ("tiles", tiles, 2),
-        ("seed", seed, 0),
-    ):
-        if not (isinstance(value, int) and value >= least):
-            raise ParameterError(f"{name} = {value!r}: expected a whole number, at least {least}.")
-    if seed >= 2**63:
-        raise ParameterError(f"seed = {seed}: expected a whole number below 2^63.")
-    if not (np.isfinite(paths) and tiles <= paths <= 1e13):
-        raise ParameterError(f"paths = {paths:g}: expected a number in [{tiles}, 1e13], one a tile at least.")
+    _check_whole("tiles", tiles, 2)
+    _check_whole("seed", seed, 0)
+    if not 1 <= paths <= 1e13:  # nor NaN
+        raise ParameterError(f"paths = {paths:g}: expected a number in [1, 1e13].")
+
+
+def _check_whole(name: str, value: Any, least: int) -> None:
+    if not (isinstance(value, int) and least <= value < 2**63):
+        raise ParameterError(f"{name} = {value!r}: expected a whole number in [{least}, 2^63).")
 
 
 def _wavelengths(given: Sequence[float] | None) -> tuple[float, ...]:
@@ -147,6 +151,19 @@ def _wavelengths(given: Sequence[float] | None) -> tuple[float, ...]:
     if len(chosen) != channels or not all(360 <= w <= 830 for w in chosen):
         raise ParameterError(f"wavelengths = {chosen}: expected {channels} of them, in [360, 830] nm.")
     return chosen
+
+
+def _warn_of_repetition(piece: Piece, incident: np.ndarray) -> None:
+    """Light that crosses more than a tile on its way in meets the same things again, unlike on an endless surface."""
+    theta = incident[:, 0].max()
+    if isinstance(piece, Tile) and piece.random:
+        crossed = (piece.top - piece.bottom) * np.tan(np.radians(theta)) / min(piece.width, piece.depth)
+        if crossed > 1:
+            warnings.warn(
+                f"theta = {theta:g}: light crosses {crossed:.1f} tiles on its way in, and they repeat; larger ones, of "
+                "more grains, say, would be nearer to an endless surface.",
+                stacklevel=3,
+            )
 
 
 def _check_facets(piece: Piece) -> None:

@@ -7,34 +7,23 @@ import json
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import mitsuba as mi
 import numpy as np
 
 from ..errors import ParameterError, UnknownNameError, UnreadableFileError, readable
+from .periodic import Triangles, centred, normals
 from .tile import Tile
 
 MESHES = (".ply", ".obj")
 HEIGHTS = (".npy", ".png", ".exr")
 PERIODIC = ("wrap", "mirror")
 DIFFUSE = {"type": "diffuse"}
-TOLERANCE = 2e-6
-"""Borders match within this share of the largest coordinate: the rounding of two numbers of six digits in a text file,
-and far more than that of two float32."""
 MARGIN = 1e-3
 """Between the surface and the top and bottom of its tile, as a share of the extent."""
 STEEPEST = 100
 """Heights may span that many widths of the tile; more is a mistake about units, and too coarse for float32."""
-
-
-class Triangles(NamedTuple):
-    """One period of a surface, or a quarter of one that is mirrored; its bounding box is centred on the origin."""
-
-    vertices: np.ndarray  # (n, 3)
-    faces: np.ndarray  # (m, 3): indices of vertices, counter-clockwise from outside
-    uv: np.ndarray  # (n, 2)
-    size: np.ndarray  # (3,): of the bounding box
 
 
 class Triangulated:
@@ -47,7 +36,7 @@ class Triangulated:
     @cached_property
     def overhangs(self) -> int:
         """How many faces do not look up; there are none in a height field."""
-        return int(np.count_nonzero(_normals(*self.triangles[:2])[:, 2] <= 0))
+        return int(np.count_nonzero(normals(*self.triangles[:2])[:, 2] <= 0))
 
     def tile(self, rng: np.random.Generator) -> Tile:
         """Always the same tile, built when it is first asked for, of the variant that is then in use.
@@ -129,7 +118,7 @@ class Mesh(Triangulated):
     @cached_property
     def triangles(self) -> Triangles:  # type: ignore[override]
         """What the file holds, checked; faces without any area are left out."""
-        return _centred(*_read(Path(self.path)), wrapped=self.periodic == "wrap")
+        return centred(*_read(Path(self.path)), wrapped=self.periodic == "wrap")
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,12 +222,6 @@ def _content(path: str | Path) -> dict[str, Any]:
     return {"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
 
 
-def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Normals (faces, 3), as long as twice the faces' areas."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)
-
-
 def _mirrored(quarter: Triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices, faces and texture coordinates of a mesh and its reflections, 2 x 2; the seams are the axes, exactly."""
     inner = quarter.vertices - [*quarter.size[:2] / 2, 0]
@@ -307,120 +290,3 @@ def _read(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         )
     uv = np.array(parameters["vertex_texcoords"]).reshape(-1, 2) if mesh.has_vertex_texcoords() else None
     return vertices, faces, uv
-
-
-def _centred(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None, wrapped: bool) -> Triangles:
-    """A mesh moved to the middle, if it is a surface that may be repeated."""
-    used, faces = np.unique(faces, return_inverse=True)
-    original, vertices, faces = vertices, vertices[used], faces.reshape(-1, 3)
-    wrong = np.flatnonzero(~np.all(np.isfinite(vertices), axis=1))
-    if len(wrong):
-        raise ParameterError(
-            f"mesh: vertex {used[wrong[0]]} is at {_where(original[used[wrong[0]]])}: expected finite coordinates; "
-            f"{len(wrong)} such vertices."
-        )
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    size = high - low
-    tolerance = TOLERANCE * max(np.abs(vertices).max(), size.max())
-    if min(size[:2]) <= 4 * tolerance:
-        raise ParameterError(
-            f"mesh: it spans {_where(size)} in x, y and z: expected a width and a depth above {4 * tolerance:g}. "
-            "Heights must be along z; many programs export y up."
-        )
-    at_border = np.stack([np.abs(vertices - low) <= tolerance, np.abs(vertices - high) <= tolerance])[..., :2]
-    open_edges, owners = _open_edges(vertices, faces)
-    sides = at_border[:, open_edges].all(axis=2)  # (low or high, edges, x or y)
-    holes = np.flatnonzero(~sides.reshape(2, -1, 2).any(axis=2).any(axis=0))
-    if len(holes):
-        a, b = vertices[open_edges[holes[0]]]
-        raise ParameterError(
-            f"mesh: a hole. Face {owners[holes[0]]} has no neighbour across the edge from {_where(a)} to {_where(b)}, "
-            f"which is not on the tile's border, x = {low[0]:g} or {high[0]:g}, y = {low[1]:g} or {high[1]:g}; "
-            f"{len(holes)} such edges. Fill holes, join edges that meet, and cut the mesh to a rectangle."
-        )
-    _check_cover(vertices, faces, size)
-    if wrapped:
-        _check_borders(vertices, open_edges, sides, tolerance)
-    vertices = vertices - (low + high) / 2
-    vertices[:, :2] = np.where(at_border[0], -size[:2] / 2, np.where(at_border[1], size[:2] / 2, vertices[:, :2]))
-    uv = vertices[:, :2] / size[:2] + 0.5 if uv is None else uv[used]
-    return Triangles(vertices, faces[np.any(_normals(vertices, faces) != 0, axis=-1)], uv, size)
-
-
-def _open_edges(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (n, 2) of only one face, and that face; each other edge must be of two, once in each direction.
-
-    Vertices at the same place count as one: files repeat them along the seams of textures, say.
-    """
-    _, first, place = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
-    corners = place.reshape(-1)[faces]
-    edges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
-    real = np.repeat(np.all(corners != np.roll(corners, -1, axis=1), axis=1), 3)  # not of faces that are mere lines
-    owners, edges = np.flatnonzero(real) // 3, edges[real]
-    low, high = edges.min(axis=1), edges.max(axis=1)
-    _, edge, counts = np.unique(low * len(first) + high, return_inverse=True, return_counts=True)
-    turns = np.bincount(edge, np.where(edges[:, 0] == low, 1, -1), len(counts))
-    for wrong, what in (
-        (counts > 2, "more than one neighbour"),
-        ((counts == 2) & (turns != 0), "a neighbour of opposite orientation"),
-    ):
-        if wrong.any():
-            k = np.argmax(wrong[edge])
-            a, b = vertices[first[edges[k]]]
-            raise ParameterError(
-                f"mesh: face {owners[k]} has {what} across the edge from {_where(a)} to {_where(b)}; "
-                f"{np.count_nonzero(wrong)} such edges. Expected one surface of faces counter-clockwise from above."
-            )
-    open_ones = counts[edge] == 1
-    return first[edges[open_ones]], owners[open_ones]
-
-
-def _check_cover(vertices: np.ndarray, faces: np.ndarray, size: np.ndarray) -> None:
-    """A surface whose border is that of the tile covers it once: what looks up less what looks down is its area."""
-    cover = _normals(vertices, faces)[:, 2].sum() / 2 / np.prod(size[:2])
-    if cover < -0.5:
-        raise ParameterError(
-            "mesh: it is upside down: its faces are clockwise from above. Flip them, or reverse the order of each "
-            "face's vertices."
-        )
-    if abs(cover - 1) > 1e-3:
-        raise ParameterError(
-            f"mesh: seen from above, its faces cover {cover:g} of its bounding box, {_where(size[:2])}, less "
-            "those that look down: expected 1. A closed body covers 0: leave its bottom and sides away."
-        )
-
-
-def _check_borders(vertices: np.ndarray, edges: np.ndarray, sides: Any, tolerance: float) -> None:
-    """Opposite borders are the same lines."""
-    for axis, name in enumerate("xy"):
-        plane = [1 - axis, 2]
-        low, high = (vertices[edges[side]][..., plane] for side in sides[..., axis])
-        for one, other in ((low, high), (high, low)):
-            points = one.reshape(-1, 2)
-            apart = _distances(points, other)
-            worst = np.argmax(apart)
-            if apart[worst] > tolerance:
-                y, z = points[worst]
-                raise ParameterError(
-                    f"mesh: its borders in {name} do not match. At {'yx'[axis]} = {y:g}, z = {z:g} they are "
-                    f"{apart[worst]:g} apart; {np.count_nonzero(apart > tolerance)} of {len(apart)} ends of the "
-                    f'border\'s edges are more than {tolerance:g} apart. Use periodic="mirror", or mend the mesh.'
-                )
-
-
-def _distances(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
-    """From each of the points (n, 2) to the nearest of the segments (m, 2, 2)."""
-    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
-    square = np.maximum(np.sum(along**2, axis=1), np.finfo(float).tiny)
-
-    def nearest(some: np.ndarray) -> np.ndarray:
-        to = some[:, None] - start
-        share = np.clip(np.sum(to * along, axis=-1) / square, 0, 1)
-        return np.linalg.norm(to - share[..., None] * along, axis=-1).min(axis=1)
-
-    pieces = np.array_split(points, 1 + len(points) * len(segments) // 2**20)  # never much memory
-    return np.concatenate([nearest(some) for some in pieces if len(some)])
-
-
-def _where(point: np.ndarray) -> str:
-    return "(" + ", ".join(f"{x:g}" for x in point) + ")"

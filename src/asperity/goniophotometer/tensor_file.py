@@ -33,6 +33,7 @@ import contextlib
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -40,7 +41,7 @@ from scipy.ndimage import map_coordinates
 from ..errors import ParameterError
 from ..files import atomically
 from .measurement import Measurement
-from .sensors import Hemisphere, directions
+from .sensors import Hemisphere, Sensor, directions
 
 SIGMA = 4096
 """Vertices of the table of cosines along θ_i: many, since it bends at the last θ_i, where cosines are small."""
@@ -57,9 +58,10 @@ def write(measurement: Measurement, path: str | Path) -> None:
     from mitsuba.python import tensor_io
 
     sensor, values = measurement.sensor, measurement.summed.value
-    if not isinstance(sensor, Hemisphere):
-        raise ParameterError(f"sensor = {sensor.kind!r}: expected a hemisphere, for all directions.")
-    theta, phi, rows = _grid(measurement)
+    theta, phi, rows = grid(sensor, measurement.incident)
+    assert isinstance(sensor, Hemisphere)
+    if not (np.all(np.isfinite(values)) and np.all(measurement.paths.sum(axis=0))):
+        raise ParameterError("values: expected finite ones in all directions of incidence.")
     isotropic = len(phi) == 1
     start = measurement.incident[0, 1] if isotropic else 0.0
     slices = [_tables(sensor, values[row], measurement.wi[row], start) for row in rows.flat]
@@ -97,17 +99,20 @@ def write(measurement: Measurement, path: str | Path) -> None:
         )
 
 
-def _grid(measurement: Measurement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """θ_i and φ_i in radians, φ_i from [-π, π), and the rows (φ_i, θ_i) of the measurement that belong to them."""
-    if not (np.all(np.isfinite(measurement.summed.value)) and np.all(measurement.paths.sum(axis=0))):
-        raise ParameterError("values: expected finite ones in all directions of incidence.")
-    row = {(theta, (phi + 180) % 360 - 180): k for k, (theta, phi) in enumerate(measurement.incident.tolist())}
+def grid(sensor: Sensor, incident: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """θ_i and φ_i in radians, φ_i from [-π, π), and the rows (φ_i, θ_i) of a measurement that belong to them.
+
+    Raises ParameterError if what is measured so cannot be written.
+    """
+    if not isinstance(sensor, Hemisphere):
+        raise ParameterError(f"sensor = {sensor.kind!r}: expected a hemisphere, for all directions.")
+    row = {(theta, (phi + 180) % 360 - 180): k for k, (theta, phi) in enumerate(np.asarray(incident).tolist())}
     thetas, phis = (list(dict.fromkeys(angles)) for angles in zip(*row))
     if len(thetas) < 2 or thetas != sorted(thetas):
         raise ParameterError(f"theta = {thetas}: expected at least two θ_i, increasing.")
     phis.sort()
     even = np.allclose(np.diff(phis), 360 / len(phis), atol=0.01)
-    if not even or not len(measurement.incident) == len(row) == len(thetas) * len(phis):
+    if not even or not len(incident) == len(row) == len(thetas) * len(phis):
         raise ParameterError(f"phi = {phis}: expected one φ_i, or some that divide the circle evenly, for each θ_i.")
     rows = np.array([[row[theta, phi] for theta in thetas] for phi in phis])
     return np.radians(thetas), np.radians(phis), rows

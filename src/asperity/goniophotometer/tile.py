@@ -27,6 +27,7 @@ class Tile(NamedTuple):
     depth: float  # period in y
     bottom: float  # height below which there is nothing
     top: float  # height above which there is nothing
+    random: bool = False  # whether it stands for an endless surface, of which it is a piece drawn by chance
     window: float = np.inf  # side of the square through which a batch of rays enters: coherent rays are fast rays
 
     def rays(self, wavelengths: tuple[float, ...] = VISIBLE) -> Box:

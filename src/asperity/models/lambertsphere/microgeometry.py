@@ -120,7 +120,7 @@ class ExplicitSpheres:
         )
         spheres = sphere_cloud(centres) | {"bsdf": {"type": "diffuse", "reflectance": reflectance}}
         scene = mi.load_dict({"type": "scene", "spheres": spheres}, parallel=False)
-        return Tile(scene, width, width, -depth - 1.001, 1.001)
+        return Tile(scene, width, width, -depth - 1.001, 1.001, True)
 
 
 def sphere_cloud(centres: np.ndarray) -> dict[str, Any]:

@@ -106,7 +106,7 @@ class ExplicitGrains:
                 "bsdf": self.grain,
             }
         window = np.sqrt(width * depth * min(1, COHERENT / self.grains))
-        return Tile(mi.load_dict(shapes, parallel=False), width, depth, -1e-3, 1 + 1e-3, window)
+        return Tile(mi.load_dict(shapes, parallel=False), width, depth, -1e-3, 1 + 1e-3, True, window)
 
 
 def _tensor(values: np.ndarray) -> mi.TensorXf:

@@ -45,7 +45,7 @@ class ExplicitGrooves:
         alpha = float(np.sqrt(2 / (model["exponent"] + 2))) if "exponent" in given else model["alpha"]
         alpha_u, alpha_v = (model[name] if name in given else alpha for name in ("alpha_u", "alpha_v"))
         metal = {name: model[name] for name in {"material", "eta", "k"} & given} or {"material": "none"}
-        return cls(model["distribution"] or "ggx", alpha_u, alpha_v, model["symmetric"], {"type": "conductor"} | metal)
+        return cls(model["distribution"], alpha_u, alpha_v, model["symmetric"], {"type": "conductor"} | metal)
 
     @property
     def description(self) -> dict[str, Any]:
