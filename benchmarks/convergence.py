@@ -16,12 +16,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-mi.set_variant("llvm_ad_rgb")
-
-from asperity.lab import evaluate  # noqa: E402
-from asperity.microfacet.distributions import DISTRIBUTIONS  # noqa: E402
-from asperity.models.vgroove.kaleidoscope import Groove, leaving_share  # noqa: E402
-from asperity.scenes.preview import preview  # noqa: E402
+from asperity.lab import evaluate
+from asperity.microfacet.distributions import DISTRIBUTIONS
+from asperity.models.vgroove.kaleidoscope import Groove, leaving_share
+from asperity.scenes.preview import preview
 
 N, BOUNCES = 2**20, 60
 SETS = (("ggx", 0.2, 75), ("ggx", 0.7, 45), ("ggx", 0.7, 75), ("ggx", 0.7, 85), ("beckmann", 0.7, 75), ("ggx", 1.0, 85))
@@ -68,6 +66,7 @@ def frames(material: dict) -> tuple[float, float]:
 
 def main() -> None:
     """Print both tables."""
+    mi.set_variant("llvm_ad_rgb")
     console = Console(width=130)
     names = ("paper", "authors' code", "vgroove")
     table = Table("distribution", "alpha", "degrees", *(f"{name}: mean, variance, largest" for name in names))

@@ -11,13 +11,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-mi.set_variant("llvm_ad_rgb")
-
-from asperity.goniophotometer import Hemisphere  # noqa: E402
-from asperity.goniophotometer.sensors import directions  # noqa: E402
-from asperity.goniophotometer.tile import opaque  # noqa: E402
-from asperity.goniophotometer.tracer import UNIT, Settings, generator, trace  # noqa: E402
-from asperity.models.micrograin import ExplicitGrains  # noqa: E402
+from asperity.goniophotometer import Hemisphere
+from asperity.goniophotometer.sensors import directions
+from asperity.goniophotometer.tile import opaque
+from asperity.goniophotometer.tracer import UNIT, Settings, generator, trace
+from asperity.models.micrograin import ExplicitGrains
 
 PATHS, ORDERS, THETA = 2**20, 64, 60.0
 WHITE = {"type": "diffuse", "reflectance": 1.0}
@@ -79,6 +77,7 @@ def meshed(geometry, seed, rings=6, sectors=16):
 
 def main():
     """Print both tables."""
+    mi.set_variant("llvm_ad_rgb")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="up to 10^5 grains, one repetition")
     quick = parser.parse_args().quick

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from asperity.lab.evaluate import variates
-from asperity.microfacet.distributions import DISTRIBUTIONS, GGX, Beckmann, Phong, Profile
+from asperity.microfacet.distributions import DISTRIBUTIONS, GGX, Beckmann, Profile
 from asperity.microfacet.fresnel import conductor
 from asperity.models.vgroove import fresnel, nonsymmetric
-from asperity.models.vgroove.bounces import needed_bounces, needed_bounces_nonsymmetric
+from asperity.models.vgroove.bounces import needed_bounces_nonsymmetric
 from asperity.models.vgroove.kaleidoscope import Groove, Pair, bounces, exit_angle, leaving_share, symmetric_bounces
 from asperity.models.vgroove.model import VGroove, _more_numbers
 from asperity.models.vgroove.symmetric import symmetric
@@ -224,13 +224,6 @@ def test_ggx_of_alpha_one_is_phong_of_exponent_zero(rgb):
     ggx, _ = evaluate(i, o, alpha=1.0)
     phong, _ = evaluate(i, o, distribution="phong", exponent=0.0)
     np.testing.assert_allclose(ggx, phong, rtol=1e-4, atol=1e-6)
-
-
-def test_published_numbers_of_bounces():
-    """Lee et al. 2018, Table 2, all 27 entries."""
-    table = {0.1: (2, 3, 3, 2, 3, 5, 3, 4, 5), 0.05: (2, 3, 3, 3, 4, 7, 4, 5, 7), 0.01: (3, 3, 4, 3, 5, 16, 8, 12, 16)}
-    for lost, row in table.items():
-        assert row == tuple(needed_bounces(d, a, lost) for d in (Beckmann, Phong, GGX) for a in (0.5, 0.7, 1.0))
 
 
 def test_default_number_of_bounces(rgb):
