@@ -20,8 +20,8 @@ from .report import SIGNIFICANCE, Effort, Finding, Section, Table, agreement
 
 REFIT = 3e-3
 """Relative error of the refitted modes below 84 degrees, for albedos from .2 on: tests/models/test_lambertsphere.py."""
-ALBEDO_FIT = 1e-3
-"""Absolute error of the directional albedo: the white furnace is .9989 at worst."""
+FITTED_H = 1.2e-3
+"""Relative error of the directional albedo: H is fitted to 6e-4, and stands twice in what is scattered repeatedly."""
 ALBEDOS = (0.2, 0.5, 0.8, 0.95, 0.99)
 INCIDENT = ((5.0, 0.0), (38.0, 0.0), (60.0, 0.0), (80.0, 0.0))
 OUTGOING = tuple((theta, phi) for theta in (10.0, 38.0, 60.0, 80.0) for phi in (0.0, 45.0, 90.0, 135.0, 180.0))
@@ -138,9 +138,8 @@ def energy(effort: Effort) -> Section:
         measured = measure(RandomWalk(albedo), incident, paths=paths, tiles=effort.tiles, seed=effort.seed)
         truth = Estimate(*(part[:, 0] for part in measured.total_albedo))
         found = {v: evaluate.albedo(evaluate.load(spheres(albedo, variant=v)), measured.wi)[0] for v in VARIANTS}
-        tolerance = ALBEDO_FIT / found["accurate"]
         findings.append(
-            agreement(f"albedo of accurate, c {albedo:g}", truth, found["accurate"], effort.tiles, tolerance)
+            agreement(f"albedo of accurate, c {albedo:g}", truth, found["accurate"], effort.tiles, FITTED_H)
         )
         rows.append((albedo, *(" ".join(f"{x:.4f}" for x in values) for values in (truth.value, *found.values()))))
     white = evaluate.albedo(evaluate.load(spheres(1.0)), directions([(t, 0.0) for t in (0, 30, 60, 80, 88, 89.5)]))[0]

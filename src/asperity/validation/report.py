@@ -55,16 +55,14 @@ class Effort(NamedTuple):
     seed: int = 0
 
 
-def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float | np.ndarray) -> Finding:
+def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float) -> Finding:
     """Whether all numbers of a model lie within the truth's standard errors, and a relative ``tolerance`` of its own.
 
     Standard errors come from ``tiles`` tiles, so deviations follow Student's t with one degree of freedom less.
     Numbers that were measured to worse than a tenth are too few hits for that: they are compared as one, by their sum.
     """
-    shape = truth.value.shape
-    value, error, model, allowed = (
-        np.ravel(np.broadcast_to(a, shape)).astype(float) for a in (*truth, model, tolerance * np.abs(model))
-    )
+    value, error, model = (np.ravel(a).astype(float) for a in (*truth, np.broadcast_to(model, truth.value.shape)))
+    allowed = tolerance * np.abs(model)
     good = error < 0.1 * np.abs(value)
     if not good.any():
         raise ValueError(f"{claim}: nothing was measured to a tenth; more paths are needed")
@@ -78,7 +76,7 @@ def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolera
     return Finding(
         claim,
         f"mean error {mean:.2%} in {good.sum()} numbers; worst {worst:.1f} standard errors",
-        f"{limit:.1f} standard errors beyond {np.max(tolerance):.2%}",
+        f"{limit:.1f} standard errors beyond {tolerance:.2%}",
         bool(worst <= limit and rest <= rest_limit),
     )
 

@@ -22,12 +22,14 @@ from .report import Effort, Finding, Section, Table, agreement
 
 FLOAT32 = 1e-4
 """Relative error that is not noise."""
-QUADRATURE = 1e-2
-"""Relative error of the non-symmetric model's fixed quadrature (`nonsymmetric.MULTIPLE`)."""
+QUADRATURE = 2e-3
+"""Mean relative error of the non-symmetric model's fixed quadrature: tests/models/test_vgroove.py."""
 POLE = 6.0
 """Degrees about the mirror direction: cells that reach there are not judged. f has a pole that few directions miss."""
 COVER = 16
 """Directions that cover a cell, squared, when the model is averaged over it."""
+EXIT = 1e-4
+"""Radians: float32 adds up some hundred bounces, each rounded to 1e-7."""
 RAYS = 1000
 """In a groove, stratified; independent ones would have an error of a few percent instead."""
 TABLE_2 = {
@@ -119,15 +121,15 @@ def kaleidoscope(step: int = 1) -> Section:
             errors.append(np.abs(shares - predicted(psi, left, right, most)).sum(axis=1))
             exits.append(exit_error(psi, left, right, out, count))
         error = np.concatenate(errors)
-        # A border between two numbers of bounces that lies between two rays moves 1/RAYS from one share to another,
-        # which counts twice in the L1 norm; a groove has up to a few borders.
+        largest = published[name][0]
         rows.append((name, len(error), f"{error.max():.4f}", f"{error.mean():.5f}", *published[name]))
-        bound = 4 * 2 / RAYS
         findings.append(
-            Finding(f"{name}: shares by bounces", f"L1 error {error.max():.4f}", f"{bound}", bool(error.max() < bound))
+            Finding(
+                f"{name}: shares by bounces", f"L1 error {error.max():.4f}", f"{largest}", bool(error.max() <= largest)
+            )
         )
         worst = float(np.max(exits))
-        findings.append(Finding(f"{name}: exit angles", f"{worst:.1e} rad", "1e-3", worst < 1e-3))
+        findings.append(Finding(f"{name}: exit angles", f"{worst:.1e} rad", f"{EXIT:g} rad", worst < EXIT))
     return Section(
         "The kaleidoscope (Table 1)",
         f"{RAYS} stratified rays over the opening of a groove. The paper's numbers are for random walks; with as "
