@@ -1,6 +1,6 @@
 """Writes what in the documentation comes from the code: `python docs/build.py [--pictures]`.
 
-The parameter tables always (a test holds them to the declarations), the pictures on request: they take two minutes.
+The parameter tables always (a test holds them to the declarations), the pictures on request: they take three minutes.
 """
 
 from __future__ import annotations
@@ -43,6 +43,31 @@ def strip(path: Path, size: int = 256, spp: int = 256) -> None:
     mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)[..., :3]), write_async=False)
 
 
+def save(figure, path: Path) -> None:
+    """A figure, small, in 256 colours."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=75)
+    Image.open(buffer).convert("RGB").quantize(256).save(path, optimize=True)
+
+
+def figures(folder: Path) -> None:
+    """Those of the goniophotometer and of two reports."""
+    from asperity.goniophotometer import measure, plots
+    from asperity.models import MODELS
+    from asperity.validation import lambertsphere, report, vgroove
+
+    grains = {"type": "micrograin", "tau_0": 0.5}
+    angles = [(60.0, 0.0), (86.0, 0.0)]
+    measured = measure(MODELS["micrograin"].microgeometry(grains), angles, orders=1, paths=2e7, about={"model": grains})
+    save(plots.draw(measured, grains), folder / "grains.png")
+    save(vgroove.furnace_spheres(), folder / "furnace-vgroove.png")
+    save(lambertsphere.ball(report.Effort(4e6, 32)).figures["ball"], folder / "ball.png")
+
+
 def main() -> None:
     """Write the tables, and the pictures if asked."""
     import asperity  # noqa: F401  (before Mitsuba)
@@ -53,6 +78,7 @@ def main() -> None:
         page.write_text(with_table(page.read_text(), model))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
+        figures(DOCS / "pictures")
 
 
 if __name__ == "__main__":
