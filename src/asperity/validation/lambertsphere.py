@@ -16,7 +16,7 @@ from ..lab import evaluate
 from ..models.lambertsphere.microgeometry import ExplicitSpheres, RandomWalk, Sphere, sphere_cloud
 from ..models.lambertsphere.transport import phase_cdf
 from . import figures
-from .report import SIGNIFICANCE, Effort, Finding, Section, Table, agreement
+from .report import CLAIMS, SIGNIFICANCE, Effort, Finding, Section, Table, agreement
 
 REFIT = 3e-3
 """Relative error of the refitted modes below 84 degrees, for albedos from .2 on: tests/models/test_lambertsphere.py."""
@@ -62,7 +62,7 @@ def phase_function(effort: Effort) -> Section:
     expected = np.diff(np.array(phase_cdf(mi.Float(grid)), dtype=float))
     counts, _ = np.histogram(np.clip(cos, -1, 1), grid)
     chi = stats.chisquare(counts, expected / expected.sum() * counts.sum()).pvalue
-    bound = SIGNIFICANCE / 8
+    bound = SIGNIFICANCE / CLAIMS
     mean, error = cos.mean(), cos.std() / np.sqrt(n)
     return Section(
         "The phase function (Eq. 1 to 5)",
