@@ -10,6 +10,9 @@ import drjit as dr
 SMALL = 0.03
 """Below this the Taylor series is used: its error, x⁴/5 relative, equals the rounding of the direct form above it."""
 
+SHORTEST = 1e-14
+"""Square of the sine below which a direction is the normal: the rounding of its components in float32."""
+
 
 def log1p(x):
     """log(1 + x) for x > -1."""
@@ -21,3 +24,11 @@ def one_minus_exp(x):
     """1 - exp(-x) for x >= 0."""
     series = x * (1 - x * (1 / 2 - x * (1 / 6 - x * (1 / 24))))
     return dr.select(x < SMALL, series, 1 - dr.exp(-x))
+
+
+def heading(x, y, otherwise=(1, 0)):
+    """The unit vector along (x, y), as a pair; ``otherwise`` where that is too short to have a direction."""
+    square = dr.square(x) + dr.square(y)
+    defined = square > SHORTEST
+    scale = dr.rsqrt(dr.select(defined, square, 1))
+    return dr.select(defined, x * scale, otherwise[0]), dr.select(defined, y * scale, otherwise[1])

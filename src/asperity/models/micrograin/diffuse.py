@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from ...microfacet.numerics import heading
 from ...microfacet.quadrature import gauss_legendre, integrate
 from .grains import exposure
 from .shadows import Shadows, shadow, to_sphere
@@ -97,9 +98,11 @@ class _Azimuth:
     def __init__(self, i, o):
         self.i, self.o = i, o
         self.radius_i, self.radius_o = (dr.sqrt(w.x * w.x + w.y * w.y + 1e-14) for w in (i, o))
-        cross = i.x * o.y - i.y * o.x
+        # Along the normal, i has no azimuth: any will do, if that of o is counted from it.
+        self.forward = x, y = heading(i.x, i.y)
+        cross = x * o.y - y * o.x
         self.turn = dr.select(cross < 0, -1.0, 1.0)
-        self.between = dr.atan2(dr.abs(cross), i.x * o.x + i.y * o.y + 1e-12)  # squared in the derivative
+        self.between = dr.atan2(dr.abs(cross), x * o.x + y * o.y + 1e-12)  # squared in the derivative
         self.sin_between, self.cos_between = dr.sincos(self.between)
 
     def arcs(self, h):
@@ -136,8 +139,7 @@ class _Azimuth:
     def nodes(self, h):
         """(m', (i'.m') (o'.m'), weight) at the nodes of a Gauss-Legendre rule on either lit arc."""
         radius = dr.safe_sqrt(1 - h * h)
-        forward_x, forward_y = self.i.x / self.radius_i, self.i.y / self.radius_i
-        forward_x = dr.select(self.radius_i > 1e-6, forward_x, 1)
+        forward_x, forward_y = self.forward
         for (start, end), count in zip(self.arcs(h), AZIMUTHS):
             for t, weight in zip(*gauss_legendre(count)):
                 sin, cos = dr.sincos(start + t * (end - start))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import drjit as dr
 
-from ...microfacet.numerics import log1p, one_minus_exp
+from ...microfacet.numerics import heading, log1p, one_minus_exp
 from .shadows import inclination, silhouette
 
 
@@ -55,7 +55,7 @@ def sample_visible_normal(r, w, u, v):
     h = _visible_height(r, sin, cos, u)
     radius = dr.safe_sqrt((1 - h) * (1 + h))
     sin_azimuth, cos_azimuth = _visible_azimuth(sin, cos, h, radius, v)
-    x, y = dr.select(sin > 1e-6, w.x / sin, 1), w.y / sin
+    x, y = heading(w.x, w.y)
     return type(w)(radius * (x * cos_azimuth - y * sin_azimuth), radius * (y * cos_azimuth + x * sin_azimuth), h)
 
 

@@ -60,11 +60,11 @@ class Shadows:
 
     def __init__(self, i, o):
         self.i, self.o = i, o
-        x, y = i.x - o.x, i.y - o.y  # differences first: i.o and cross products lose all digits near retro-reflection
-        # i.z - o.z of unit vectors, from the other two: were it rounded on its own, i and o that differ in z alone, by
-        # a few ulp, would seem to cast shadows apart.
-        z = -(x * (i.x + o.x) + y * (i.y + o.y)) / (i.z + o.z)
-        one_minus_cos = (x * x + y * y + z * z) / 2
+        # The difference first: i.o and cross products lose all digits near retro-reflection. That of unit vectors is at
+        # right angles to their sum; what is not is rounding, which may be all there is of the longest component.
+        between, both = i - o, i + o
+        between = between - both * (dr.dot(between, both) / dr.squared_norm(both))
+        x, y, one_minus_cos = between.x, between.y, dr.squared_norm(between) / 2
         cross = dr.abs(i.x * y - i.y * x)
         self.sides = [
             self._side(w, cross, along, one_minus_cos)

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from ...microfacet.numerics import heading
+
 
 class Groove(NamedTuple):
     """The tilts of a groove's two facets, in (0, pi/2)."""
@@ -111,11 +113,9 @@ class Pair(NamedTuple):
     def of(cls, i, o) -> Pair:
         """The pair of two unit vectors above the surface."""
         h = i + o
-        flat = dr.square(h.x) + dr.square(h.y)
-        defined = flat > 1e-14
-        flat = dr.sqrt(dr.select(defined, flat, 1))
-        x, y = dr.select(defined, h.x / flat, 1), dr.select(defined, h.y / flat, 0)
-        flat = dr.select(defined, flat, 0)
+        # In the mirror direction the plane is any, and the plane of incidence as good as others.
+        x, y = heading(h.x, h.y, heading(i.x - o.x, i.y - o.y))
+        flat = h.x * x + h.y * y
         norm = dr.sqrt(dr.square(flat) + dr.square(h.z))  # 2 l cos delta
         sin, cos = flat / norm, h.z / norm
         across = ((i.x - o.x) * x + (i.y - o.y) * y) * cos - (i.z - o.z) * sin
