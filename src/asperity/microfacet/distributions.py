@@ -15,7 +15,8 @@ where the scale cancels: it depends on the azimuth through alpha_phi only. `ggx`
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 
@@ -131,7 +132,8 @@ DISTRIBUTIONS: dict[str, Any] = {"ggx": GGX, "beckmann": Beckmann, "phong": Phon
 """By the name that a scene uses."""
 
 
-class Profile(NamedTuple):
+@dataclass
+class Profile:
     """A distribution along one azimuth."""
 
     kind: Any  # one of the classes above

@@ -17,22 +17,41 @@ def gauss_legendre(n: int) -> tuple[list[float], list[float]]:
     return list(map(float, (x + 1) / 2)), list(map(float, w / 2))
 
 
-def integrate(f: Callable[[Any], tuple], n: int, like: Any) -> tuple:
-    """Integrals over [0, 1] of the functions that ``f`` returns as a tuple, by ``n`` Gauss-Legendre nodes.
+def accumulate(term: Callable[[Any, Any], tuple], count: Any, start: tuple, captured: Any) -> tuple:
+    """``start`` and, for each index below ``count``, ``term(index, captured)``: tuples, summed in a recorded loop.
 
-    ``like`` is a number of the type that ``f`` takes and returns. Dr.Jit arrays are summed in a recorded loop: it runs
-    as fast as ``n`` copies of ``f``, and compiles ten times faster. Derivatives need the copies.
+    ``captured`` is all that the terms are computed from, where it may carry derivatives: arrays in tuples, lists and
+    dataclasses. What a body takes from around it instead has no derivatives if the loop is in a virtual call, as BSDFs
+    are in every render (Dr.Jit 1.5).
+    """
+
+    def add(index, captured, sums):
+        return index + 1, captured, tuple(total + one for total, one in zip(sums, term(index, captured)))
+
+    # -1: Dr.Jit then differentiates a sum backwards without storing its terms, if it starts from constants. With any
+    # other number it aborts the process there, if the loop is in a virtual call.
+    begin = type(count)(0), captured, tuple(dr.zeros(type(total)) for total in start)
+    sums = dr.while_loop(begin, lambda index, *_: index < count, add, max_iterations=-1)[2]
+    return tuple(total + more for total, more in zip(start, sums))
+
+
+def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, nested: bool = False) -> tuple:
+    """Integrals over [0, 1] of the functions that ``f(node, captured)`` returns as a tuple, by ``n`` Gauss nodes.
+
+    ``like`` is a number of the type that ``f`` takes; ``captured`` is that of `accumulate`. A recorded loop runs as fast
+    as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives need
+    the copies.
     """
     nodes, weights = gauss_legendre(n)
-    if not dr.is_jit_v(like) or dr.grad_enabled(first := f(type(like)(nodes[0]))):
-        terms = [[weight * value for value in f(node)] for node, weight in zip(nodes, weights)]
+    if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(type(like)(nodes[0]), captured))):
+        terms = [[weight * value for value in f(node, captured)] for node, weight in zip(nodes, weights)]
         return tuple(map(sum, zip(*terms)))
     Float, UInt = type(like), dr.uint32_array_t(type(like))
+    start = tuple(dr.zeros(type(value)) for value in f(Float(nodes[0]), captured))
     nodes, weights = Float(nodes), Float(weights)
 
-    def add(index, totals):
-        values, weight = f(dr.gather(Float, nodes, index)), dr.gather(Float, weights, index)
-        return index + 1, [total + weight * value for total, value in zip(totals, values)]
+    def term(index, captured):
+        weight = dr.gather(Float, weights, index)
+        return tuple(weight * value for value in f(dr.gather(Float, nodes, index), captured))
 
-    start = UInt(1), [weights[0] * value for value in first]
-    return tuple(dr.while_loop(start, lambda index, _: index < n, add)[1])
+    return accumulate(term, UInt(n), start, captured)

@@ -9,6 +9,7 @@ clamps that they need.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -93,7 +94,8 @@ def entrance(groove: Groove, psi, u):
     return dr.abs(offset), offset < 0
 
 
-class Pair(NamedTuple):
+@dataclass
+class Pair:
     """Two directions in the plane of their half vector h and the normal, with all that their BRDF depends on.
 
     ``theta`` is half the sum of their angles there, which is h's, ``delta`` half the difference, without its sign.

@@ -12,16 +12,17 @@ g' = g sin l sin r being the width of the rays that leave after k bounces. C is 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 
 from ...microfacet.distributions import GGX, Beckmann, Phong, Profile
-from ...microfacet.quadrature import integrate
+from ...microfacet.quadrature import accumulate, integrate
 from .fresnel import Metal, multiples, product, waves
 from .kaleidoscope import Pair
-from .symmetric import POLE, numbered, summed
+from .symmetric import POLE, numbered
 
 NODES = {GGX: (6, 4, 5), Beckmann: (12, 4, 8), Phong: (12, 4, 8)}
 """For k = 1 and k = 2, in each piece between kinks, and for all others, whose share is small.
@@ -33,15 +34,16 @@ A density has to be exact to .05 % or so: what its integral misses looks like lo
 def nonsymmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None) -> tuple[Any, Any]:
     """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``metal`` is None."""
     pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
-    through = metal and waves(metal.logarithm, pair.length)
+    captured = pair, profile, pole, () if metal is None else waves(metal.logarithm, pair.length)
 
-    def terms(nodes, double):
-        def term(k, odd, tau):
+    def with_bounces(totals, count, numbers, nodes, double):
+        def term(index, captured):
+            (k, odd, tau), (pair, profile, pole, through) = numbers(index), captured
             p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
             way = Way(k, odd, tau * p, q)
             weight, mean, variance = moments(way, profile, nodes, double)
             weight = weight * 2 * pole / dr.select(odd, k + 1, k)
-            if metal is None:
+            if not through:
                 return (weight,)
             # The product varies little over the grooves: one node, or two, of the Gauss rule for their distribution.
             if not double:
@@ -49,13 +51,13 @@ def nonsymmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None)
             spread = dr.sqrt(dr.maximum(variance, 1e-12))
             return weight, weight / 2 * (way.through(mean - spread, through) + way.through(mean + spread, through))
 
-        return term
+        return accumulate(term, count, totals, captured)
 
     few, double, multiple = NODES[profile.kind]
     single, below = _single(pair, profile, few), limits(pair)
     totals = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
-    totals = summed(totals, terms(double, True), *numbered(below, dr.minimum(most, type(most)(2))))
-    totals = summed(totals, terms(multiple, False), *numbered(below, most, lowest=(3, 3, 4, 4)))
+    totals = with_bounces(totals, *numbered(below, dr.minimum(most, type(most)(2))), double, True)
+    totals = with_bounces(totals, *numbered(below, most, lowest=(3, 3, 4, 4)), multiple, False)
     scale = dr.rcp(4 * cos_i * pair.cos_delta * (profile.scale * profile.kind.partner(profile.alpha)))
     return scale * totals[-1], scale * totals[0]
 
@@ -84,12 +86,12 @@ def _single(pair: Pair, profile: Profile, nodes: int):
 
     Over t with tan r = alpha tan t, in which D varies evenly, and on either side of the tilt that begins to shade.
     """
-    alpha, l = profile.alpha, (pair.sin_theta, pair.cos_theta)
-    x = dr.sincos(pair.theta + pair.delta)
-    shade = dr.atan2(x[1], alpha * x[0])
+    l, x = (pair.sin_theta, pair.cos_theta), dr.sincos(pair.theta + pair.delta)
+    shade = dr.atan2(x[1], profile.alpha * x[0])
 
-    def at(node):
-        total = 0
+    def at(node, captured):
+        total, (profile, l, x, shade) = 0, captured
+        alpha = profile.alpha
         for low, high in ((0, shade), (shade, dr.pi / 2)):
             sin, cos = dr.sincos(low + (high - low) * node)
             stretch = dr.rsqrt(dr.square(alpha * sin) + dr.square(cos))
@@ -99,11 +101,12 @@ def _single(pair: Pair, profile: Profile, nodes: int):
             total = total + (high - low) * alpha * dr.square(stretch) * weight
         return (total,)
 
-    (integral,) = integrate(at, nodes, pair.theta)
+    (integral,) = integrate(at, nodes, (profile, l, x, shade), pair.theta)
     return profile.density(*l) * integral
 
 
-class Way(NamedTuple):
+@dataclass
+class Way:
     """How light goes from x to y in k >= 2 bounces, through all grooves that lead there, one for each tilt r."""
 
     k: Any
@@ -143,19 +146,6 @@ class Way(NamedTuple):
         small, large = dr.minimum(a, b), dr.maximum(a, b)
         return low, dr.minimum(small, c), dr.maximum(small, dr.minimum(large, c)), dr.maximum(large, c), high
 
-    def widths(self):
-        """Function of (sin l, cos l) and (sin r, cos r): g', the width of the rays that leave after k bounces."""
-        x, y = dr.sincos(self.p + self.q), dr.sincos(self.p - self.q)
-
-        def width(l, r):
-            near, far = (tuple(dr.select(self.odd, a, b) for a, b in zip(*two)) for two in ((l, r), (r, l)))
-            f_0, f_1, f_2 = _reaches(x, l, r)
-            f_next, f_k, f_before = _reaches(y, near, far)
-            lit = dr.minimum(dr.minimum(f_1, f_2), dr.minimum(f_before, f_k))
-            return dr.maximum(lit - dr.maximum(dr.maximum(f_0, f_next), 0), 0)
-
-        return width
-
     def through(self, r, e):
         """Product of the reflectances in the groove with this r: u = Q and w = tau P, shifted by half r - l."""
         l = self.first_tilt(r)
@@ -167,13 +157,35 @@ class Way(NamedTuple):
         return product(e, self.k, self.odd, bends, [cos for _, cos in u], b)
 
 
+@dataclass
+class Width:
+    """g', the width of the rays that leave a groove after k bounces."""
+
+    odd: Any
+    x: tuple  # sine and cosine
+    y: tuple
+
+    @classmethod
+    def of(cls, way: Way) -> Width:
+        """That of a way."""
+        return cls(way.odd, dr.sincos(way.p + way.q), dr.sincos(way.p - way.q))
+
+    def __call__(self, l, r):
+        """For (sin l, cos l) and (sin r, cos r)."""
+        near, far = (tuple(dr.select(self.odd, a, b) for a, b in zip(*two)) for two in ((l, r), (r, l)))
+        f_0, f_1, f_2 = _reaches(self.x, l, r)
+        f_next, f_k, f_before = _reaches(self.y, near, far)
+        lit = dr.minimum(dr.minimum(f_1, f_2), dr.minimum(f_before, f_k))
+        return dr.maximum(lit - dr.maximum(dr.maximum(f_0, f_next), 0), 0)
+
+
 def moments(way: Way, profile: Profile, nodes: int, double: bool):
     """(integral of D(l) sin l D(r) sin r g' over r, mean r, variance of r); ``double`` tells that k = 2."""
-    (low, extent), width = way.interval(), way.widths()
+    low, extent = way.interval()
     ends = way.kinks(low, low + extent) if double else (low, low + extent)
 
-    def at(node):
-        sums = [0, 0, 0]
+    def at(node, captured):
+        (way, profile, ends, width), sums = captured, [0, 0, 0]
         for begin, end in pairwise(ends):
             tilt = begin + (end - begin) * node
             l, r = dr.sincos(way.first_tilt(tilt)), dr.sincos(tilt)
@@ -181,7 +193,7 @@ def moments(way: Way, profile: Profile, nodes: int, double: bool):
             sums = [sums[0] + weight, sums[1] + weight * tilt, sums[2] + weight * tilt * tilt]
         return tuple(sums)
 
-    total, first, second = integrate(at, nodes, way.p)
+    total, first, second = integrate(at, nodes, (way, profile, ends, Width.of(way)), way.p, nested=True)
     mean, square = (moment / dr.select(total > 1e-15, total, 1) for moment in (first, second))
     return total, mean, square - mean * mean
 

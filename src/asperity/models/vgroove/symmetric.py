@@ -13,11 +13,13 @@ except near the mirror direction.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
 from ...microfacet.distributions import Profile
+from ...microfacet.quadrature import accumulate
 from .fresnel import Metal, multiples, product, waves
 from .kaleidoscope import Pair
 
@@ -29,31 +31,21 @@ energy of GGX with alpha 1, and less of others."""
 def symmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None) -> tuple[Any, Any]:
     """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``metal`` is None."""
     pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
-    share, through = _Share(pair), metal and _Through(pair, metal)
+    count, numbers = numbered(limits(pair), most)
 
-    def term(k, odd, tau):
-        b = (dr.pi / 2 - tau * dr.select(odd, pair.theta, pair.delta)) / k
+    def term(index, captured):
+        (k, odd, tau), (pole, profile, share, *through) = numbers(index), captured
+        b = (dr.pi / 2 - tau * dr.select(odd, share.pair.theta, share.pair.delta)) / k
         sin, cos = dr.sincos(b)
         value = pole * cos / k * profile.density(cos, sin) * share(odd, tau, sin, cos)
-        return (value,) if metal is None else (value, value * through(k, odd, tau, sin, cos))
+        return (value, *(value * reflectances(k, odd, tau, sin, cos) for reflectances in through))
 
     single = profile.density(pair.sin_theta, pair.cos_theta) * cook_torrance_share(pair)
     start = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
-    totals = summed(start, term, *numbered(limits(pair), most))
+    captured = (pole, profile, Share.of(pair), *(() if metal is None else (Through.of(pair, metal),)))
+    totals = accumulate(term, count, start, captured)
     scale = dr.rcp(4 * cos_i * pair.cos_delta)
     return scale * totals[-1], scale * totals[0]
-
-
-def summed(totals, term, count, term_of) -> tuple:
-    """``totals``, and the terms that `numbered` counts, in a recorded loop."""
-
-    def add(index, sums):
-        return index + 1, tuple(total + one for total, one in zip(sums, term(*term_of(index))))
-
-    # -1: Dr.Jit then differentiates a sum backwards without storing its terms, if it starts from constants.
-    start = type(count)(0), tuple(0 * dr.detach(total) for total in totals)
-    _, sums = dr.while_loop(start, lambda index, _: index < count, add, max_iterations=-1)
-    return tuple(total + more for total, more in zip(totals, sums))
 
 
 def cook_torrance_share(pair: Pair):
@@ -92,15 +84,22 @@ def numbered(limits, most, lowest=(3, 3, 2, 2)):
     return ends[3], term
 
 
-class _Share:
+@dataclass
+class Share:
     """g of k >= 2; without trigonometric functions of its own, and without cancellation where it is small."""
 
-    def __init__(self, pair: Pair):
-        self.sums = pair.cos_theta * pair.cos_delta, pair.sin_theta * pair.sin_delta
-        self.sines = pair.sin_theta * pair.cos_delta, pair.cos_theta * pair.sin_delta
-        self.pair = pair
+    pair: Pair
+    sums: tuple  # cosines and sines of theta and delta, multiplied like with like
+    sines: tuple  # and one with the other
+
+    @classmethod
+    def of(cls, pair: Pair) -> Share:
+        """What does not depend on the term."""
+        sums = pair.cos_theta * pair.cos_delta, pair.sin_theta * pair.sin_delta
+        return cls(pair, sums, (pair.sin_theta * pair.cos_delta, pair.cos_theta * pair.sin_delta))
 
     def __call__(self, odd, tau, sin, cos):
+        """g, for the sine and cosine of b."""
         pair, (a, b) = self.pair, self.sums
         p, q = dr.select(odd, self.sines[0], self.sines[1]), dr.select(odd, self.sines[1], self.sines[0])
         lit = sin * (a + tau * b) + cos * (tau * p - q)  # sin(b + tau P - Q)
@@ -109,18 +108,26 @@ class _Share:
         return dr.maximum(dr.minimum(lit, 2 * cos_p * (sin * cos_q - cos * sin_q)), 0)
 
 
-class _Through:
+@dataclass
+class Through:
     """The product of the reflectances: u = Q and w = tau P, the same for all k of a parity."""
 
-    def __init__(self, pair: Pair, metal: Metal):
-        self.waves = waves(metal.logarithm, pair.length)
+    waves: list
+    tops: list
+    bends: list
+
+    @classmethod
+    def of(cls, pair: Pair, metal: Metal) -> Through:
+        """What does not depend on the term; pairs are for odd and even k."""
         theta, delta = multiples(pair.sin_theta, pair.cos_theta), multiples(pair.sin_delta, pair.cos_delta)
-        self.tops = [(d, t) for (_, t), (_, d) in zip(theta, delta)]
-        self.bends = [
+        tops = [(d, t) for (_, t), (_, d) in zip(theta, delta)]
+        bends = [
             (d * t, d * t) if n % 2 else (-d * z, -t * y) for n, ((z, t), (y, d)) in enumerate(zip(theta, delta), 1)
         ]
+        return cls(waves(metal.logarithm, pair.length), tops, bends)
 
     def __call__(self, k, odd, tau, sin, cos):
+        """Product of k reflectances, for the sine and cosine of b."""
         bends = [(1 if n % 2 else tau) * dr.select(odd, *bend) for n, bend in enumerate(self.bends, 1)]
         tops = [dr.select(odd, *top) for top in self.tops]
         return product(self.waves, k, odd, bends, tops, multiples(sin, cos))
