@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import mitsuba as mi
+
+
+@dataclass
+class Dielectric:
+    """A smooth interface to a dielectric of relative index ``eta``."""
+
+    eta: Any
+
+    def __call__(self, cos):
+        """Unpolarised reflectance at the cosine of incidence from outside."""
+        return mi.fresnel(cos, self.eta)[0]
 
 
 def conductor(cos, eta, k):

@@ -12,6 +12,7 @@ gives the density of this way to sample: a visible normal first, then the cosine
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -47,7 +48,7 @@ def lambertian(
     *,
     closed: bool,
     share: Callable | None = None,
-    transmittance: Callable | None = None,
+    coat: Callable | None = None,
 ) -> Integral:
     """Integrate Lambertian grains seen from ``wi`` and lit from ``wo``, both above the surface (Lucas 2024, Eq. 21).
 
@@ -58,52 +59,67 @@ def lambertian(
     shaded(shadows, h) : area of the shadows at height h, by the choice of masking
     closed : the azimuth has a closed form; needs beta_x = beta_y, no coat, and a share that varies with height only
     share(h, m) : of the second albedo at height h and normal m (None if closed), in [0, 1]
-    transmittance(cos_i, cos_o) : of a grain's dielectric coat, for local cosines
+    coat(cos) : reflectance of a grain's dielectric coat, for a local cosine
+
+    What ``share`` and ``coat`` are computed from are the fields of a dataclass: see `accumulate`.
     """
     i, o = to_sphere(wi, beta_x, beta_y), to_sphere(wo, beta_x, beta_y)
     stretch_o = dr.sqrt(dr.square(beta_x * wo.x) + dr.square(beta_y * wo.y) + dr.square(wo.z))  # |E o|
-    azimuth, shadows = _Azimuth(i, o), Shadows(i, o)
+    captured = r, beta_x, beta_y, wi, wo, Azimuth.between(i, o), Shadows(i, o), share, coat
 
-    def at_height(t):
+    def at_height(t, captured):
+        r, beta_x, _, _, _, azimuth, shadows, share, _ = captured
         h, jacobian = 1 - (1 - t) ** 3, 3 * (1 - t) ** 2  # crowded at the top, which alone is seen at grazing
         if closed:
             lit = azimuth.product(h) * dr.rsqrt(dr.square(beta_x) * (1 - h * h) + h * h)
             second = share(h, None) * lit if share else 0 * lit
             value = lit
         else:
-            value, second, lit = at_azimuths(h)
+            value, second, lit = at_azimuths(h, captured)
         exposed = jacobian * exposure(r, h, shaded(shadows, h))
-        visible = jacobian * exposure(r, h, shadow(i, h))
+        visible = jacobian * exposure(r, h, shadow(azimuth.i, h))
         return exposed * (value - second), exposed * second, visible * lit
 
-    def at_azimuths(h):
+    def at_azimuths(h, captured):
+        _, beta_x, beta_y, wi, wo, azimuth, _, share, coat = captured
         value, second, lit = 0, 0, 0
         for m, cosines, width in azimuth.nodes(h):
             m = type(wi)(beta_x * m.x, beta_y * m.y, m.z)
             length = dr.rsqrt(dr.squared_norm(m))
             m, term = m * length, width * cosines * length
-            through = transmittance(dr.dot(wi, m), dr.dot(wo, m)) * term if transmittance else term
+            through = (1 - coat(dr.dot(wi, m))) * (1 - coat(dr.dot(wo, m))) * term if coat else term
             value, lit = value + through, lit + term
             second = second + share(h, m) * through if share else 0 * through
         return value, second, lit
 
-    first, second, pdf = integrate(at_height, HEIGHTS, r * wi.z)
+    first, second, pdf = integrate(at_height, HEIGHTS, captured, r * wi.z)
     scale = r * stretch_o / (dr.pi * i.z)
     return Integral(scale * first, scale * second, scale * pdf)
 
 
-class _Azimuth:
+@dataclass
+class Azimuth:
     """The lit azimuths of a grain at one height: where (i'.m')+ (o'.m')+ is positive, x counted from i towards o."""
 
-    def __init__(self, i, o):
-        self.i, self.o = i, o
-        self.radius_i, self.radius_o = (dr.sqrt(w.x * w.x + w.y * w.y + 1e-14) for w in (i, o))
+    i: Any
+    o: Any
+    radius_i: Any
+    radius_o: Any
+    forward: tuple  # unit vector at x = 0
+    turn: Any  # 1 if x is counted counterclockwise, else -1
+    angle: Any  # from i to o, in [0, pi]
+    sin: Any
+    cos: Any
+
+    @classmethod
+    def between(cls, i, o) -> Azimuth:
+        """What does not depend on the height."""
         # Along the normal, i has no azimuth: any will do, if that of o is counted from it.
-        self.forward = x, y = heading(i.x, i.y)
+        x, y = heading(i.x, i.y)
         cross = x * o.y - y * o.x
-        self.turn = dr.select(cross < 0, -1.0, 1.0)
-        self.between = dr.atan2(dr.abs(cross), x * o.x + y * o.y + 1e-12)  # squared in the derivative
-        self.sin_between, self.cos_between = dr.sincos(self.between)
+        angle = dr.atan2(dr.abs(cross), x * o.x + y * o.y + 1e-12)  # squared in the derivative
+        radii = (dr.sqrt(w.x * w.x + w.y * w.y + 1e-14) for w in (i, o))
+        return cls(i, o, *radii, (x, y), dr.select(cross < 0, type(cross)(-1), 1), angle, *dr.sincos(angle))
 
     def arcs(self, h):
         """Start and end of the two lit arcs; the second one is there when light comes from behind, else it is empty."""
@@ -114,9 +130,9 @@ class _Azimuth:
             return dr.atan2(dr.safe_sqrt(b * b - a * a), -a)
 
         lit_i, lit_o = half_width(self.i, self.radius_i), half_width(self.o, self.radius_o)
-        start, end = dr.maximum(-lit_i, self.between - lit_o), dr.minimum(lit_i, self.between + lit_o)
+        start, end = dr.maximum(-lit_i, self.angle - lit_o), dr.minimum(lit_i, self.angle + lit_o)
         yield start, dr.maximum(start, end)
-        yield -lit_i, dr.maximum(-lit_i, dr.minimum(lit_i, self.between + lit_o - 2 * dr.pi))
+        yield -lit_i, dr.maximum(-lit_i, dr.minimum(lit_i, self.angle + lit_o - 2 * dr.pi))
 
     def product(self, h):
         """Integral of (i'.m')+ (o'.m')+ over the azimuth, in closed form."""
@@ -125,13 +141,13 @@ class _Azimuth:
 
         def primitive(x):
             sin, cos = dr.sincos(x)
-            sin_o = sin * self.cos_between - cos * self.sin_between  # sin(x - between)
-            cos_o = cos * self.cos_between + sin * self.sin_between
+            sin_o = sin * self.cos - cos * self.sin  # sin(x - angle)
+            cos_o = cos * self.cos + sin * self.sin
             return (
                 a_i * a_o * x
                 + a_i * b_o * sin_o
                 + a_o * b_i * sin
-                + b_i * b_o / 2 * (x * self.cos_between + (sin * cos_o + cos * sin_o) / 2)
+                + b_i * b_o / 2 * (x * self.cos + (sin * cos_o + cos * sin_o) / 2)
             )
 
         return dr.maximum(sum(primitive(end) - primitive(start) for start, end in self.arcs(h)), 0)
@@ -143,7 +159,7 @@ class _Azimuth:
         for (start, end), count in zip(self.arcs(h), AZIMUTHS):
             for t, weight in zip(*gauss_legendre(count)):
                 sin, cos = dr.sincos(start + t * (end - start))
-                sin *= self.turn
+                sin = sin * self.turn
                 m = type(self.i)(
                     radius * (cos * forward_x - sin * forward_y), radius * (cos * forward_y + sin * forward_x), h
                 )

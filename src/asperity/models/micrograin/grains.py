@@ -6,6 +6,9 @@ m' with m'_z = h. ``r`` is the density in sphere space, ``tau_0`` the filling fa
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import drjit as dr
 
 from ...microfacet.numerics import heading, log1p, one_minus_exp
@@ -18,6 +21,18 @@ def density(tau_0):
     tau_0 = 1 would need infinitely many grains; it stands for 1 - 1e-6.
     """
     return -log1p(-dr.minimum(tau_0, 1 - 1e-6)) / dr.pi
+
+
+@dataclass
+class Share:
+    """How much of its second colour a grain has at a point: by height, or by normal if there is an azimuth."""
+
+    cos: Any = None  # of the azimuth of the normals with the second colour
+    sin: Any = None
+
+    def __call__(self, h, m):
+        """The share, in [0, 1], at height ``h`` and normal ``m``."""
+        return h if self.cos is None else (1 + m.x * self.cos + m.y * self.sin) / 2
 
 
 def exposure(r, h, shaded):

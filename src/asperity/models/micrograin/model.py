@@ -12,13 +12,13 @@ import numpy as np
 from ...conductors import Conductor
 from ...errors import ParameterError
 from ...microfacet.albedo import directional_albedo
-from ...microfacet.fresnel import conductor
+from ...microfacet.fresnel import Dielectric, conductor
 from ...microfacet.quadrature import gauss_legendre
 from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict
 from . import smith
 from .compensation import LossTable, lobe
 from .diffuse import lambertian
-from .grains import density, exposure, normal_in_sphere_space, sample_visible_normal, visible_fraction
+from .grains import Share, density, exposure, normal_in_sphere_space, sample_visible_normal, visible_fraction
 from .microgeometry import ExplicitGrains
 from .shadows import Shadows, lift, shadow, to_sphere
 
@@ -337,7 +337,7 @@ class Micrograin(Declared):
             self._shaded,
             closed=self.isotropic and coat is None and self.variation != "normal",
             share=self._share(si, active),
-            transmittance=coat and (lambda cos_i, cos_o: (1 - coat(cos_i)) * (1 - coat(cos_o))),
+            coat=coat,
         )
         value = albedo * first
         if self.variation != "none":
@@ -380,18 +380,15 @@ class Micrograin(Declared):
         return albedo if self.variation == "none" else (albedo + self.diffuse_reflectance_2.eval(si, active)) / 2
 
     def _share(self, si, active):
-        """Function (h, m) for the second colour's share at a point of the grain, or None."""
-        if self.variation == "height":
-            return lambda h, m: h
+        """The second colour's share at a point of the grain, or None."""
         if self.variation == "normal":
             sin, cos = dr.sincos(dr.deg2rad(self.variation_azimuth.eval_1(si, active)))
-            return lambda h, m: (1 + m.x * cos + m.y * sin) / 2
-        return None
+            return Share(cos, sin)
+        return Share() if self.variation == "height" else None
 
     def _coat(self, si, active):
-        """Function from the local cosine to the Fresnel reflectance of the grains' dielectric coat."""
-        eta = self.int_ior.eval_1(si, active) / self.ext_ior.eval_1(si, active)
-        return lambda cos: mi.fresnel(cos, eta)[0]
+        """The grains' dielectric coat: from the local cosine to its reflectance."""
+        return Dielectric(self.int_ior.eval_1(si, active) / self.ext_ior.eval_1(si, active))
 
     def _mean_albedo(self, si, active):
         """Hemispherical mean of what a facet of the grain reflects, at half height and upright."""

@@ -8,6 +8,9 @@ Arguments are Dr.Jit arrays of any precision, or plain floats; directions have `
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import drjit as dr
 
 GRAZING = 1e-3
@@ -50,6 +53,7 @@ def shadow(w, h):
     return dr.maximum((alpha - h * sin * sin_alpha) / cos - (1 - h * h) * gamma, 0)
 
 
+@dataclass
 class Shadows:
     """The two shadows along ``i`` and ``o``, which may overlap (Lucas 2024, Appendix B).
 
@@ -58,18 +62,22 @@ class Shadows:
     silhouette points, +-alpha, yields the paper's three cases without telling them apart.
     """
 
-    def __init__(self, i, o):
-        self.i, self.o = i, o
+    i: Any
+    o: Any
+    sides: Any = None  # what `_half` needs of either, from i and o
+
+    def __post_init__(self):
+        if self.sides is not None:  # a copy of Dr.Jit's, in a loop
+            return
+        i, o = self.i, self.o
         # The difference first: i.o and cross products lose all digits near retro-reflection. That of unit vectors is at
         # right angles to their sum; what is not is rounding, which may be all there is of the longest component.
         between, both = i - o, i + o
         between = between - both * (dr.dot(between, both) / dr.squared_norm(both))
         x, y, one_minus_cos = between.x, between.y, dr.squared_norm(between) / 2
         cross = dr.abs(i.x * y - i.y * x)
-        self.sides = [
-            self._side(w, cross, along, one_minus_cos)
-            for w, along in ((i, i.x * x + i.y * y), (o, -(o.x * x + o.y * y)))
-        ]
+        alongs = i.x * x + i.y * y, -(o.x * x + o.y * y)
+        self.sides = [self._side(w, cross, along, one_minus_cos) for w, along in zip((i, o), alongs)]
 
     @staticmethod
     def _side(w, cross, along, one_minus_cos):

@@ -23,11 +23,12 @@ def masking(r, w):
     """G1(w) = cos / int D(m) (w.m)+ dm, for ``w`` in sphere space."""
     sin, cos = inclination(w)
 
-    def width(h):  # int (w.m')+ over the azimuth, of what is exposed at height h
+    def width(h, captured):  # int (w.m')+ over the azimuth, of what is exposed at height h
+        r, sin, cos = captured
         _, sin_alpha, gamma = silhouette(sin, cos, h)
         return (2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha) * exposure(r, h, 0),)
 
-    (projected,) = integrate(width, HEIGHTS, r * cos)
+    (projected,) = integrate(width, HEIGHTS, (r, sin, cos), r * cos)
     return dr.minimum(cos * filling_factor(r) / (dr.maximum(r, TINY) * projected), 1)
 
 
