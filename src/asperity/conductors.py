@@ -12,7 +12,11 @@ import drjit as dr
 import mitsuba as mi
 
 from .errors import ParameterError, suggestion
-from .parameters import Colour, Parameter, Row, Texture
+from .microfacet.numerics import clamp, keep
+from .parameters import Colour, Parameter, Row, Spectrum
+
+ETA, K, TINT = Spectrum("", low=1e-3, high=100.0), Spectrum("", high=100.0), Colour("")
+"""Allowed ranges of a metal's parts."""
 
 
 @dataclass(frozen=True)
@@ -32,20 +36,21 @@ class Complex:
     def eval(self, si: mi.SurfaceInteraction3f, active: Any) -> tuple[Any, Any]:
         """(eta, k) at a surface point."""
         if self.eta is not None:
-            return self.eta.eval(si, active), self.k.eval(si, active)
+            return ETA.clamp(self.eta.eval(si, active)), K.clamp(self.k.eval(si, active))
         return artist_friendly(self.reflectivity.eval(si, active), self.edge_tint.eval(si, active))
 
 
 def artist_friendly(reflectivity: Any, edge_tint: Any) -> tuple[Any, Any]:
     """(eta, k) of the metal that reflects ``reflectivity`` at normal incidence (Gulbrandsen 2014, Eq. 1 to 4).
 
-    ``edge_tint`` in [0, 1] biases the colour at grazing angles. Reflectivity is kept within [0, 0.9999]: at 1, k would
-    be infinite.
+    ``edge_tint`` in [0, 1] biases the colour at grazing angles. Reflectivity is kept within [1e-6, 0.9999]: at 1, k
+    would be infinite, and at 0 the derivative of eta.
     """
-    r = dr.clip(reflectivity, 0, 0.9999)
+    r, edge_tint = keep(clamp(reflectivity, 0, 1), 1e-6, 0.9999), clamp(edge_tint, 0, 1)
     low, high = (1 - r) / (1 + r), (1 + dr.sqrt(r)) / (1 - dr.sqrt(r))
     eta = edge_tint * low + (1 - edge_tint) * high
-    return eta, dr.safe_sqrt((r * dr.square(eta + 1) - dr.square(eta - 1)) / (1 - r))
+    k2 = (r * dr.square(eta + 1) - dr.square(eta - 1)) / (1 - r)
+    return eta, dr.sqrt(keep(k2, 1e-6, dr.inf))
 
 
 @dataclass(frozen=True)
@@ -72,13 +77,13 @@ class Conductor(Parameter):
             for name, other in ((eta, k), (k, eta)):
                 if name not in props:
                     raise ParameterError(f"{other} is given without {name}: a metal's index needs both.")
-            return Complex(*(_index(name, low).texture(props, name) for name, low in ((eta, 1e-3), (k, 0.0))))
+            return Complex(*(part.named(name).texture(props, name) for name, part in ((eta, ETA), (k, K))))
         if reflectivity not in props:
             raise ParameterError(f"{edge_tint} is given without {reflectivity}.")
         tint = props.get_texture(edge_tint, 0.0) if edge_tint not in props else None
         return Complex(
-            reflectivity=_colour(reflectivity).texture(props, reflectivity),
-            edge_tint=tint or _colour(edge_tint).texture(props, edge_tint),
+            reflectivity=TINT.named(reflectivity).texture(props, reflectivity),
+            edge_tint=tint or TINT.named(edge_tint).texture(props, edge_tint),
         )
 
     def _named(self, material: Any, name: str) -> Complex:
@@ -100,9 +105,9 @@ class Conductor(Parameter):
 
     def check(self, value: Any) -> None:
         """Check the textures of the chosen way."""
+        parts = {"eta": ETA, "k": K, "reflectivity": TINT, "edge_tint": TINT}
         for name, texture in self.children(value).items():
-            tint = name.startswith(("reflectivity", "edge_tint"))
-            (_colour(name) if tint else _index(name, 0.0)).check(texture)
+            parts[name.removesuffix(self.suffix)].named(name).check(texture)
 
     def rows(self) -> Iterable[Row]:
         """A line for each name."""
@@ -111,24 +116,13 @@ class Conductor(Parameter):
         yield Row(
             material, "name", default, 'Mitsuba\'s, or "none"', "", f"{self.meaning}: by name; 'none' is a mirror"
         )
-        yield Row(eta, "spectrum or texture", "-", "> 0", "", f"{self.meaning}: real part of the index, with {k}")
-        yield Row(k, "spectrum or texture", "-", "[0, inf)", "", f"{self.meaning}: extinction, with {eta}")
-        yield Row(
-            reflectivity, "colour or texture", "-", "[0, 1]", "", f"{self.meaning}: by colour at normal incidence"
-        )
-        yield Row(edge_tint, "colour or texture", "0", "[0, 1]", "", f"colour bias at grazing, with {reflectivity}")
-
-
-def _index(name: str, low: float) -> Texture:
-    part = Texture("", low=low, high=100.0)
-    part.__set_name__(Texture, name)
-    return part
-
-
-def _colour(name: str) -> Colour:
-    part = Colour("")
-    part.__set_name__(Colour, name)
-    return part
+        for name, part, default, meaning in (
+            (eta, ETA, "-", f"{self.meaning}: real part of the index, with {k}"),
+            (k, K, "-", f"{self.meaning}: extinction, with {eta}"),
+            (reflectivity, TINT, "-", f"{self.meaning}: by colour at normal incidence"),
+            (edge_tint, TINT, "0", f"colour bias at grazing, with {reflectivity}"),
+        ):
+            yield Row(name, part.kind, default, part.allowed(), "", meaning)
 
 
 @cache

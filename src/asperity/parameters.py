@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Set
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
@@ -17,6 +18,7 @@ import mitsuba as mi
 import numpy as np
 
 from .errors import ParameterError, suggestion
+from .microfacet.numerics import clamp
 
 
 class Row(NamedTuple):
@@ -41,7 +43,16 @@ class Parameter:
     unit: ClassVar[str] = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
-        object.__setattr__(self, "name", name)
+        if self.name in ("", name):
+            object.__setattr__(self, "name", name)
+        else:  # another class's parameter under a new name
+            setattr(owner, name, self.named(name))
+
+    def named(self, name: str) -> Any:
+        """The same parameter with another name."""
+        other = copy(self)
+        object.__setattr__(other, "name", name)
+        return other
 
     def __get__(self, model: Any, owner: type) -> Any:
         return self  # on the class; a loaded model's own attribute, the parsed value, comes first
@@ -78,17 +89,16 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Texture(Parameter):
-    """A number in a range, constant or from a texture; ``unit`` says what it counts."""
+    """A number in a range, both ends included, constant or from a texture; ``unit`` says what it counts."""
 
     low: float = 0.0
     high: float = math.inf
-    open_low: bool = False
     unit: str = ""  # type: ignore[misc]
     kind: ClassVar[str] = "number or texture"
 
     def allowed(self) -> str:
         """The range as an interval."""
-        return f"{'(' if self.open_low else '['}{self.low:g}, {self.high:g}{')' if math.isinf(self.high) else ']'}"
+        return f"[{self.low:g}, {self.high:g}{')' if math.isinf(self.high) else ']'}"
 
     def parse(self, props: mi.Properties) -> Any:
         """A ``mi.Texture``, or None if none is given and there is no default."""
@@ -105,12 +115,10 @@ class Texture(Parameter):
             texture = self.get(props, name)
         except RuntimeError as error:
             raise self.wrong(name, props.as_string(name)) from error
+        # A grey would do, but for Mitsuba, which takes any colour by its luminance.
+        if not isinstance(self, Spectrum) and not (varies(texture) or texture.class_name() == "UniformSpectrum"):
+            raise ParameterError(f"{name}: a colour or spectrum, where one number is expected.")
         self.check(texture)
-        if not isinstance(self, Colour) and not texture.is_spatially_varying():
-            try:
-                texture.eval_1(dr.zeros(mi.SurfaceInteraction3f))
-            except RuntimeError as error:
-                raise ParameterError(f"{name}: a spectrum, where one number is expected.") from error
         return texture
 
     def get(self, props: mi.Properties, name: str) -> Any:
@@ -118,9 +126,14 @@ class Texture(Parameter):
         return props.get_unbounded_texture(name)
 
     def holds(self, value: float) -> bool:
-        """Whether a number is in range; NaN and infinity never are."""
-        above = value > self.low if self.open_low else value >= self.low
-        return math.isfinite(value) and above and value <= self.high
+        """Whether a number is in range, as arrays hold it; NaN and infinity never are."""
+        with np.errstate(over="ignore"):
+            low, value, high = np.float32([self.low, value, self.high])
+        return bool(np.isfinite(value) and low <= value <= high)
+
+    def clamp(self, value: Any) -> Any:
+        """Values moved into the range: vertex attributes, which no check sees, and optimisers' steps may leave it."""
+        return clamp(value, self.low, self.high)
 
     def check(self, value: Any) -> None:
         """Check every constant and texel that Mitsuba shows."""
@@ -131,7 +144,14 @@ class Texture(Parameter):
 
 
 @dataclass(frozen=True)
-class Colour(Texture):
+class Spectrum(Texture):
+    """A number in a range at each wavelength."""
+
+    kind: ClassVar[str] = "spectrum or texture"
+
+
+@dataclass(frozen=True)
+class Colour(Spectrum):
     """A reflectance in [0, 1] at each wavelength: number, colour, spectrum or texture."""
 
     high: float = 1.0
@@ -184,19 +204,20 @@ class Choice(Parameter):
 
 @dataclass(frozen=True)
 class Integer(Parameter):
-    """A whole number from ``low`` on."""
+    """A whole number from ``low`` to ``high``."""
 
     low: int = 0
+    high: int = 2**31 - 1
     kind: ClassVar[str] = "whole number"
 
     def allowed(self) -> str:
         """The range as an interval."""
-        return f"[{self.low}, inf)"
+        return f"[{self.low}, {self.high}]"
 
     def parse(self, props: mi.Properties) -> int | None:
         """The number, or the default; flags and fractions are not accepted."""
         given = props.get(self.name, self.default)
-        if self.name in props and (isinstance(given, bool) or not isinstance(given, int) or given < self.low):
+        if self.name in props and (type(given) is not int or not self.low <= given <= self.high):
             raise self.wrong(self.name, repr(given))
         return given
 
@@ -280,6 +301,10 @@ class Declared:
         given = {name for name in props.keys() if not is_unnamed(name)}  # noqa: SIM118  (Properties is no dict)
         for name in sorted(given - names):
             raise ParameterError(f"{props.plugin_name()} has no parameter {name!r}. {suggestion(name, sorted(names))}")
+        nests = any(isinstance(parameter, BSDF) for parameter in declarations)
+        for name in props.keys():  # noqa: SIM118
+            if is_unnamed(name) and not (nests and isinstance(props[name], mi.BSDF)):
+                raise ParameterError(f"{props.as_string(name)} has no name. Allowed: {', '.join(sorted(names))}.")
         model = cls()
         for parameter in declarations:
             setattr(model, parameter.name, parameter.parse(props))
@@ -295,6 +320,10 @@ class Declared:
     def update(self) -> None:
         """Bring up to date what is made from the parameters, at first and whenever ``mi.traverse`` changed one."""
 
+    def number(self, name: str, si: Any, active: Any) -> Any:
+        """The number called ``name`` at a surface point."""
+        return getattr(type(self), name).clamp(getattr(self, name).eval_1(si, active))
+
     def children(self) -> dict[str, Any]:
         """Textures and nested BSDFs by name, for ``mi.traverse``."""
         return {
@@ -307,6 +336,11 @@ class Declared:
         """Check values that may have been updated through ``mi.traverse``."""
         for parameter in self.declarations():
             parameter.check(getattr(self, parameter.name))
+
+
+def varies(texture: Any) -> bool:
+    """Whether a texture may differ between points. Not all that do say so (Mitsuba's ``mesh_attribute``)."""
+    return texture.is_spatially_varying() or not texture.class_name().endswith("Spectrum")
 
 
 def numbers(texture: Any, differentiated: bool = False) -> Iterable[tuple[str, np.ndarray]]:
@@ -322,5 +356,6 @@ def numbers(texture: Any, differentiated: bool = False) -> Iterable[tuple[str, n
         if found.dtype == np.uint8:
             found = found / 255
         # In spectral variants Mitsuba keeps colours as three coefficients, which have no range.
-        if not (mi.is_spectral and found.size > 1 and 3 in (found.shape[0], found.shape[-1])):
+        texels = isinstance(data, mi.TensorXf) and found.ndim == 3 and found.shape[-1] == 3
+        if not (mi.is_spectral and (texels or isinstance(data, mi.Color3f))):
             yield key, found

@@ -11,10 +11,13 @@ import mitsuba as mi
 from .quadrature import accumulate
 
 
-def directional_albedo(sample: Callable, si: mi.SurfaceInteraction3f, active: Any, samples: int) -> Any:
+def directional_albedo(
+    sample: Callable, si: mi.SurfaceInteraction3f, active: Any, samples: int, copies: bool = False
+) -> Any:
     """Reflected and transmitted share of the light from ``si.wi``: the mean weight of the same samples every time.
 
-    ``sample(ctx, si, sample1, sample2, active)`` is a BSDF's, with an unpolarised weight.
+    ``sample(ctx, si, sample1, sample2, active)`` is a BSDF's, with an unpolarised weight. A loop is recorded, unless
+    derivatives are needed and ``copies`` asked for, which few samples can afford and forward derivatives may need.
     """
 
     def weight(index, captured):
@@ -24,6 +27,8 @@ def directional_albedo(sample: Callable, si: mi.SurfaceInteraction3f, active: An
         here = captured or (si, active)
         return (sample(mi.BSDFContext(), here[0], (mi.Float(index) + jitter) / samples, mi.Point2f(u, v), here[1])[1],)
 
+    if copies and dr.grad_enabled(weight(0, ())):
+        return sum(weight(index, ())[0] for index in range(samples)) / samples
     # Of textures, which are not in the state, forward derivatives in a direct call are too large by the number of lanes
     # if ``si`` is (Dr.Jit 1.5); in a virtual call they are right, and need it there.
     symbolic = dr.is_jit_v(si.wi) and si.wi.z.state == dr.VarState.Symbolic

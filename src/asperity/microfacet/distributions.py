@@ -67,7 +67,8 @@ class Beckmann:
     def density(alpha, sin, cos):
         """D_iso at the tilt with this sine and cosine."""
         square = dr.square(dr.maximum(cos, 1e-4))  # D underflows long before
-        return dr.exp(-dr.square(sin / alpha) / square) / (dr.pi * dr.square(alpha * square))
+        # The reciprocal before its square, or derivatives overflow.
+        return dr.exp(-dr.square(sin / alpha) / square) * dr.square(dr.rcp(alpha * square)) / dr.pi
 
     @staticmethod
     def partner(alpha):

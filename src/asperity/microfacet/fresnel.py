@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
+
+TINY = 1e-24
 
 
 @dataclass
@@ -20,5 +23,20 @@ class Dielectric:
 
 
 def conductor(cos, eta, k):
-    """Unpolarised reflectance of a conductor of index eta + i k, two spectra, for one cosine: a spectrum in [0, 1]."""
-    return type(eta)([mi.fresnel_conductor(cos, mi.Complex2f(n, extinction)) for n, extinction in zip(eta, k)])
+    """Unpolarised reflectance of a conductor of index ``eta`` + i ``k`` for the cosine of incidence: in [0, 1].
+
+    Unlike Mitsuba's, never negative by rounding, and with a derivative by k at 0, where light is totally reflected:
+    of the root a + i b of (eta + i k)^2 - sin^2, the larger part is a root, the smaller one follows from a b = eta k.
+    """
+    cos2 = cos * cos
+    sin2 = 1 - cos2
+    # eta^2 - sin^2 in two ways: one keeps the digits of a small eta, the other those of a small cosine.
+    real = dr.select(eta < 0.7, eta * eta - sin2, (eta - 1) * (eta + 1) + cos2) - k * k
+    half = eta * k
+    larger = dr.sqrt((dr.sqrt(real * real + 4 * half * half + TINY) + dr.abs(real)) / 2)
+    smaller = half / larger
+    a, b = dr.select(real > 0, larger, smaller), dr.select(real > 0, smaller, larger)
+    b2, a_cos = b * b, a * cos
+    perpendicular = (dr.square(a - cos) + b2) / (dr.square(a + cos) + b2)
+    parallel = (dr.square(a_cos - sin2) + b2 * cos2) / (dr.square(a_cos + sin2) + b2 * cos2 + TINY)
+    return perpendicular * (1 + parallel) / 2

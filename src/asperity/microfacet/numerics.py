@@ -26,6 +26,17 @@ def one_minus_exp(x):
     return dr.select(x < SMALL, series, 1 - dr.exp(-x))
 
 
+def clamp(x, low, high):
+    """``x`` within [low, high]. Unlike that of Dr.Jit's, the derivative at both ends is that of the values within."""
+    return dr.select(x < low, low, dr.select(x > high, high, x))
+
+
+def keep(x, low, high):
+    """``x`` moved into [low, high], where a formula is finite; derivatives are as if it had not been moved."""
+    kept = clamp(x, low, high)
+    return dr.replace_grad(kept, x) if dr.is_diff_v(x) else kept
+
+
 def heading(x, y, otherwise=(1, 0)):
     """The unit vector along (x, y), as a pair; ``otherwise`` where that is too short to have a direction."""
     square = dr.square(x) + dr.square(y)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -30,17 +31,26 @@ def accumulate(term: Callable[[Any, Any], tuple], count: Any, start: tuple, capt
 
     # -1: Dr.Jit then differentiates a sum backwards without storing its terms, if it starts from constants. With any
     # other number it aborts the process there, if the loop is in a virtual call.
-    begin = type(count)(0), captured, tuple(dr.zeros(type(total)) for total in start)
+    begin = type(count)(0), _apart(captured), tuple(dr.zeros(type(total)) for total in start)
     sums = dr.while_loop(begin, lambda index, *_: index < count, add, max_iterations=-1)[2]
     return tuple(total + more for total, more in zip(start, sums))
+
+
+def _apart(tree: Any) -> Any:
+    """The same values, with derivatives of their own: no others, used elsewhere, may meet a loop's (Dr.Jit 1.5)."""
+    if isinstance(tree, tuple | list):
+        return type(tree)(map(_apart, tree))
+    if is_dataclass(tree) and not isinstance(tree, type):
+        return replace(tree, **{part.name: _apart(getattr(tree, part.name)) for part in fields(tree)})
+    return tree + 0 if dr.is_array_v(tree) and dr.grad_enabled(tree) else tree
 
 
 def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, nested: bool = False) -> tuple:
     """Integrals over [0, 1] of the functions that ``f(node, captured)`` returns as a tuple, by ``n`` Gauss nodes.
 
-    ``like`` is a number of the type that ``f`` takes; ``captured`` is that of `accumulate`. A recorded loop runs as fast
-    as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives need
-    the copies.
+    ``like`` is a number of the type that ``f`` takes; ``captured`` is that of `accumulate`. A recorded loop runs as
+    fast as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives
+    need the copies.
     """
     nodes, weights = gauss_legendre(n)
     if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(type(like)(nodes[0]), captured))):

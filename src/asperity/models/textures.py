@@ -21,12 +21,12 @@ class Settled(Declared):
     top = Texture("value on upward surfaces", 0.6)
     bottom = Texture("value on downward surfaces", 0.0, unit="")
     threshold = Texture("vertical component of the normal half way between them", 0.3, low=-1, high=1)
-    softness = Texture("half the width of the step, in the same component", 0.6, open_low=True, high=4)
+    softness = Texture("half the width of the step, in the same component", 0.6, low=1e-6, high=4)
 
     def eval(self, si: mi.SurfaceInteraction3f, active: Any) -> Any:
         """Value at a surface point, from its world-space shading normal."""
         top, bottom, threshold, softness = (
-            texture.eval_1(si, active) for texture in (self.top, self.bottom, self.threshold, self.softness)
+            self.number(name, si, active) for name in ("top", "bottom", "threshold", "softness")
         )
         # The side does not matter to a twosided material seen from below: n is the surface's own outward normal.
         t = dr.clip((si.sh_frame.n.z - threshold) / softness / 2 + 0.5, 0, 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
+from ...microfacet.numerics import keep
 from ...parameters import BSDF, Texture
 from ..micrograin import Micrograin
 from ..micrograin.model import ONE_BELOW
@@ -20,6 +21,8 @@ CITATION = """\
   year    = {2000},
   doi     = {10.1109/2945.895876}
 }"""
+SHALLOW = 1e-5
+"""Depth of the pores which they have at least: shifts of nothing have no direction, and no derivative."""
 
 
 class Merillou(Mixture):
@@ -36,12 +39,12 @@ class Merillou(Mixture):
     citation = CITATION
 
     tau_0, beta, beta_x, beta_y = Micrograin.tau_0, Micrograin.beta, Micrograin.beta_x, Micrograin.beta_y
-    depth = Texture("depth of the pores over their radius", 1.0)
+    depth = Texture("depth of the pores over their radius", 1.0, high=1e6)
     metal, base = Micrograin.metal, BSDF("what lies at the bottom of the pores; black if none")
 
     def shares(self, si, active, layer, i, o):
         """See `lit_and_visible`; the metal's share is tau_0 / (1 + Lambda_i + Lambda_o)."""
-        depth = dr.maximum(self.depth.eval_1(si, active), 0)
+        depth = keep(self.number("depth", si, active), SHALLOW, dr.inf)
         metal = layer.tau_0 / (1 + layer.smith_lambda(i) + layer.smith_lambda(o))
         if self.base is None:
             return metal, 0

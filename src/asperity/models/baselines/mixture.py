@@ -10,7 +10,7 @@ import mitsuba as mi
 from ...errors import ParameterError
 from ...microfacet.fresnel import conductor
 from ...microfacet.ggx import sample_visible_normal, smith_lambda
-from ...microfacet.numerics import log1p
+from ...microfacet.numerics import keep, log1p
 from ...parameters import Declared, conflict
 from ..micrograin.grains import normal_in_sphere_space
 from ..micrograin.model import ALL_COMPONENTS, ONE_BELOW, TINY
@@ -22,7 +22,7 @@ def equivalent_roughness(tau_0, beta):
 
     Lucas 2024, Eq. 28 with its sign mended, for tau_0 in [0, 1] and beta > 0; within [0.27 beta, beta].
     """
-    tau_0 = dr.clip(tau_0, 1e-6, 1 - 1e-6)
+    tau_0 = keep(tau_0, 1e-6, 1 - 1e-6)
     return beta * dr.sqrt(-tau_0 / log1p(-tau_0))
 
 
@@ -65,9 +65,9 @@ class Mixture(Declared):
         """Settle the axes; refuse a base that light passes through or that is a perfect mirror."""
         conflict({"beta"} & given, {"beta_x", "beta_y"} & given)
         self.isotropic = not {"beta_x", "beta_y"} & given
-        self.betas = (self.beta, self.beta) if self.isotropic else (self.beta_x or self.beta, self.beta_y or self.beta)
+        self.axes = ["beta" if getattr(self, name) is None else name for name in ("beta_x", "beta_y")]
         for name in ("beta", "beta_x", "beta_y"):
-            if getattr(self, name) not in self.betas:
+            if name not in self.axes:
                 setattr(self, name, None)
         if self.base is not None and self.base.flags() & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Transmission):
             raise ParameterError(
@@ -126,10 +126,8 @@ class Mixture(Declared):
 
     def _choose(self, ctx, si, active) -> tuple[Layer, Any, Any]:
         """The layer here, and the chances of the metal and of the base; None for what is not there or not wanted."""
-        # Ranges were checked where values could be seen. Vertex attributes and an optimiser's steps could not.
-        tau_0 = dr.clip(self.tau_0.eval_1(si, active), 0, 1)
-        betas = (dr.maximum(beta.eval_1(si, active), 1e-4) for beta in self.betas)
-        layer = Layer(tau_0, *(equivalent_roughness(tau_0, beta) for beta in betas))
+        tau_0 = self.number("tau_0", si, active)
+        layer = Layer(tau_0, *(equivalent_roughness(tau_0, self.number(name, si, active)) for name in self.axes))
         wi = layer.lift(si.wi)
         metal, base = self.shares(si, active, layer, wi, mi.Vector3f(0, 0, 1))
         metal = metal * (1 + layer.smith_lambda(wi))  # without the masking, which visible normals bring along

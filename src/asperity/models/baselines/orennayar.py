@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ...microfacet.numerics import clamp
 from ...parameters import Choice, Colour, Declared, Texture
 
 CITATION = """\
@@ -41,7 +42,7 @@ class OrenNayar(Declared):
     def eval_pdf(self, ctx, si, wo, active):
         """(f cos_o, cos_o / pi)."""
         active = active & (si.wi.z > 0) & (wo.z > 0) & ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 0)
-        sigma, albedo = dr.deg2rad(dr.clip(self.sigma.eval_1(si, active), 0, 90)), self.reflectance.eval(si, active)
+        sigma, albedo = dr.deg2rad(self.number("sigma", si, active)), self.reflectance.eval(si, active)
         f = (full if self.variant == "full" else qualitative)(Angles.of(si.wi, wo), sigma * sigma, albedo)
         return dr.select(active, f * wo.z, 0), dr.select(active, wo.z / dr.pi, 0)
 
@@ -98,4 +99,5 @@ def full(angles: Angles, variance, albedo):
     half = (sin_alpha + sin_beta) / (cos_alpha + cos_beta)
     once = c1 + c2 * q / cos_beta + c3 * (1 - dr.abs(cos_phi)) * half
     twice = 0.17 * variance / (variance + 0.13) * (1 - cos_phi * dr.square(beta))
-    return albedo / dr.pi * (once + albedo * twice)
+    # From 45 degrees on, the fit is negative where it is small: -9e-4 at the worst.
+    return clamp(albedo / dr.pi * (once + albedo * twice), 0, dr.inf)

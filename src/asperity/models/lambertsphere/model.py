@@ -9,6 +9,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ...microfacet.albedo import directional_albedo
+from ...microfacet.numerics import clamp, keep
 from ...parameters import Choice, Colour, Declared, conflict
 from . import transport
 from .microgeometry import RandomWalk
@@ -84,9 +85,8 @@ class HalfSpace(Declared):
     def _root(self, si, active):
         """s = sqrt(1 - c) in [0, 1], with a finite derivative at c = 1."""
         if self.reflectance is None:
-            return dr.sqrt(dr.clip(1 - self.albedo.eval(si, active), transport.SMALL, 1))
-        # In this order, derivatives live at 0 and 1 too.
-        return self.root(dr.minimum(dr.maximum(0, self.reflectance.eval(si, active)), 1))
+            return dr.sqrt(keep(1 - clamp(self.albedo.eval(si, active), 0, 1), transport.SMALL, 1))
+        return self.root(clamp(self.reflectance.eval(si, active), 0, 1))
 
 
 class LambertSphere(HalfSpace):

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from ...microfacet.numerics import clamp
+
 GRAZING = 1e-4
 ONE_BELOW = 1 - 2**-24
 SMALL = 1e-7
@@ -232,7 +234,7 @@ def published(pair: Pair, s):
         )
     ]
     constants += [-c * (0.0589037 + 0.00473696 * c), 0.44038 * c]  # Eqs. 26 and 27
-    return dr.maximum(_modes(pair, c, h0, h1, 0, constants), 0)
+    return clamp(_modes(pair, c, h0, h1, 0, constants), 0, dr.inf)
 
 
 def fast(pair: Pair, s):
@@ -245,7 +247,7 @@ def fast(pair: Pair, s):
     azimuth = dr.safe_acos(dr.clip(pair.q / sin, -1, 1))
     shape = (azimuth + dr.sqrt(pair.u * pair.v)) * sin / (dr.safe_acos(dr.minimum(sin, ONE_BELOW)) + 0.113706 * sin)
     many = 0.0151829 * (c - 0.249978) * shape + 0.234459 * dr.power(dr.maximum(bond, SMALL), 1.85432)
-    return dr.maximum(c * _once(pair) / (pair.u + pair.v) + many, 0)
+    return clamp(c * _once(pair) / (pair.u + pair.v) + many, 0, dr.inf)
 
 
 def isotropic(pair: Pair, s):

@@ -23,6 +23,8 @@ FILLINGS, COSINES, AZIMUTHS = 25, 48, 7
 """Nodes of the tables: in arcsin(sqrt(tau_0)), and in sphere space, where losses vary evenly whatever beta: in the root
 of the cosine, and in the azimuth of the first quadrant."""
 SAMPLES = 4096
+SPARSEST = 1e-4
+"""Least filling factor of the tables."""
 
 
 class Loss(NamedTuple):
@@ -43,7 +45,7 @@ class LossTable:
     def __init__(self, beta_x: float, beta_y: float, diffuse: bool, shaded: Callable[[Shadows, Any], Any]):
         self.beta_x, self.beta_y = beta_x, beta_y
         self.azimuths = 1 if beta_x == beta_y else AZIMUTHS
-        tau_0 = np.maximum(np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2, 1e-4)  # dense at both ends
+        tau_0 = np.maximum(np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2, SPARSEST)  # dense at both ends
         root, azimuth = np.linspace(0, 1, COSINES), np.linspace(0, np.pi / 2, self.azimuths)
         grid = np.meshgrid(tau_0, np.maximum(root**2, GRAZING), azimuth, indexing="ij")
         losses, visible = _losses(grid[0], grid[1], grid[2], beta_x, beta_y, diffuse, shaded)

@@ -11,16 +11,21 @@ from typing import Any
 
 import drjit as dr
 
-from ...microfacet.numerics import heading, log1p, one_minus_exp
+from ...microfacet.numerics import heading, keep, log1p, one_minus_exp
 from .shadows import inclination, silhouette
 
 
 def density(tau_0):
     """Grains per unit area of sphere space, r = -log(1 - tau_0) / pi (Lucas 2024, Eq. 8), for tau_0 in [0, 1].
 
-    tau_0 = 1 would need infinitely many grains; it stands for 1 - 1e-6.
+    tau_0 = 1 would need infinitely many grains; it stands for 1 - 1e-6. 0 is next to nothing, which leaves quotients
+    by r finite.
     """
-    return -log1p(-dr.minimum(tau_0, 1 - 1e-6)) / dr.pi
+    return -log1p(-keep(tau_0, FEWEST, 1 - 1e-6)) / dr.pi
+
+
+FEWEST = 1e-15
+"""Filling factor that stands for 0: its reciprocal's square is still a float32."""
 
 
 @dataclass
@@ -77,7 +82,7 @@ def sample_visible_normal(r, w, u, v):
 def _visible_height(r, sin, cos, u):
     """Invert 1 - exp(-r sigma_full(h)) = u tau_i for the height h in [0, 1]."""
     whole = dr.pi / 2 * (1 + 1 / cos)  # sigma_full at h = 0
-    visible_above = -log1p(-u * one_minus_exp(r * whole)) / dr.maximum(r, 1e-12)
+    visible_above = -log1p(-u * one_minus_exp(r * whole)) / r
     # Above h = sin there is no shadow; below, the unknown is the silhouette's angle: h = sin cos(alpha).
     top = dr.pi * cos * cos
     q = dr.clip((visible_above - top) / dr.maximum(whole - top, 1e-12), 0, 1)

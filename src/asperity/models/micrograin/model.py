@@ -13,10 +13,11 @@ from ...conductors import Conductor
 from ...errors import ParameterError
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import Dielectric, conductor
+from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import gauss_legendre
-from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict
+from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict, varies
 from . import smith
-from .compensation import LossTable, lobe
+from .compensation import SPARSEST, LossTable, lobe
 from .diffuse import lambertian
 from .grains import Share, density, exposure, normal_in_sphere_space, sample_visible_normal, visible_fraction
 from .microgeometry import ExplicitGrains
@@ -88,10 +89,10 @@ class Micrograin(Declared):
 
     tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1)
     beta = Texture(
-        "height of the grains over their radius: small is flat and shiny, large is rough", 1.0, open_low=True
+        "height of the grains over their radius: small is flat and shiny, large is rough", 1.0, low=1e-4, high=1e4
     )
-    beta_x = Texture("beta along x, instead of beta", None, open_low=True)
-    beta_y = Texture("beta along y, instead of beta", None, open_low=True)
+    beta_x = Texture("beta along x, instead of beta", None, low=1e-4, high=1e4)
+    beta_y = Texture("beta along y, instead of beta", None, low=1e-4, high=1e4)
     metal = Conductor("metal of the grains", "none")
     specular = Flag("whether the grains reflect at their surface; false makes them Lambertian", True)
     diffuse_reflectance = Colour("albedo of diffuse or coated grains", 0.5)
@@ -126,7 +127,7 @@ class Micrograin(Declared):
         self.isotropic = not {"beta_x", "beta_y"} & given
         self.coated = self.specular and bool((COAT | ALBEDO) & given)
         self.diffuse = self.coated or not self.specular
-        self.betas = (self.beta, self.beta) if self.isotropic else (self.beta_x or self.beta, self.beta_y or self.beta)
+        self.axes = ["beta" if getattr(self, name) is None else name for name in ("beta_x", "beta_y")]
 
         second = self.diffuse_reflectance_2 if self.diffuse else self.metal_2
         if self.variation != "none" and second is None:
@@ -145,7 +146,7 @@ class Micrograin(Declared):
         unused += ["metal", "metal_2"] if self.diffuse else []
         unused += [] if self.coated else ["int_ior", "ext_ior"]
         unused += [] if self.variation == "normal" else ["variation_azimuth"]
-        unused += [name for name in ("beta", "beta_x", "beta_y") if getattr(self, name) not in self.betas]
+        unused += [name for name in ("beta", "beta_x", "beta_y") if name not in self.axes]
         for name in unused:
             setattr(self, name, None)
         self.lobes = self._lobes()
@@ -175,7 +176,7 @@ class Micrograin(Declared):
     def update(self) -> None:
         """Bring up to date what is made from the parameters."""
         if self.scattering == "multiple":
-            beta_x, beta_y = (self._constant(beta) for beta in self.betas)
+            beta_x, beta_y = (self._constant(getattr(self, name)) for name in self.axes)
             if (beta_x, beta_y) != self.table_betas:
                 shaded = Shadows.union if self.masking == "correlated" else Shadows.sum
                 self.table, self.table_betas = LossTable(beta_x, beta_y, self.diffuse, shaded), (beta_x, beta_y)
@@ -241,9 +242,8 @@ class Micrograin(Declared):
 
     def _choose(self, ctx, si, active) -> tuple[Grains, dict[int, Any], Any]:
         """The grains here, the chance of each enabled lobe of theirs, and that of the base (None if not wanted)."""
-        # Ranges were checked where values could be seen. Vertex attributes and an optimiser's steps could not.
-        tau_0 = dr.clip(self.tau_0.eval_1(si, active), 0, 1)
-        beta_x, beta_y = (dr.maximum(beta.eval_1(si, active), 1e-4) for beta in self.betas)
+        tau_0 = self.number("tau_0", si, active)
+        beta_x, beta_y = (self.number(name, si, active) for name in self.axes)
         grains = Grains(tau_0, density(tau_0), beta_x, beta_y)
         wi, above = grains.lift(si.wi), si.wi.z > 0
         shares = {
@@ -352,12 +352,14 @@ class Micrograin(Declared):
 
     def _multiple(self, si, active, grains: Grains, wi, wo):
         """Light that single scattering loses (`compensation`), by cosine."""
-        lost_i, lost_o = (self.table.along(grains.tau_0, w) for w in (wi, wo))
+        # Few grains do not pass light to each other: what they return is proportional to their number.
+        tau_0 = dr.maximum(grains.tau_0, SPARSEST)
+        lost_i, lost_o = (self.table.along(tau_0, w) for w in (wi, wo))
         base = mi.UnpolarizedSpectrum(0)
         if self.base is not None:
-            base = dr.clip(self._base_albedo(si, active), 0, 1)
-        value = lobe(grains.tau_0, self.table.at(grains.tau_0), lost_i, lost_o, self._mean_albedo(si, active), base)
-        return value * wo.z, wo.z / dr.pi
+            base = clamp(self._base_albedo(si, active), 0, 1)
+        value = lobe(tau_0, self.table.at(tau_0), lost_i, lost_o, self._mean_albedo(si, active), base)
+        return value * (wo.z * grains.tau_0 / tau_0), wo.z / dr.pi
 
     def _visible_normal(self, grains: Grains, wi, sample2):
         i = grains.to_sphere(wi)
@@ -382,13 +384,13 @@ class Micrograin(Declared):
     def _share(self, si, active):
         """The second colour's share at a point of the grain, or None."""
         if self.variation == "normal":
-            sin, cos = dr.sincos(dr.deg2rad(self.variation_azimuth.eval_1(si, active)))
+            sin, cos = dr.sincos(dr.deg2rad(self.number("variation_azimuth", si, active)))
             return Share(cos, sin)
         return Share() if self.variation == "height" else None
 
     def _coat(self, si, active):
         """The grains' dielectric coat: from the local cosine to its reflectance."""
-        return Dielectric(self.int_ior.eval_1(si, active) / self.ext_ior.eval_1(si, active))
+        return Dielectric(self.number("int_ior", si, active) / self.number("ext_ior", si, active))
 
     def _mean_albedo(self, si, active):
         """Hemispherical mean of what a facet of the grain reflects, at half height and upright."""
@@ -412,10 +414,10 @@ class Micrograin(Declared):
             bs, weight = self.base.sample(ctx, si, sample1, sample2, active)
             return bs, mi.unpolarized_spectrum(weight) & (bs.wo.z > 0)
 
-        return directional_albedo(reflected, upright, active, 16)
+        return directional_albedo(reflected, upright, active, 16, copies=True)
 
     def _constant(self, beta) -> float:
-        if beta.is_spatially_varying():
+        if varies(beta):
             raise ParameterError('beta: a texture, which scattering = "multiple" does not allow; tau_0 may be one.')
         return float(np.asarray(beta.mean()).item())
 

@@ -12,11 +12,10 @@ import drjit as dr
 from ...microfacet.ggx import sample_visible_normal as sample_visible_normal
 from ...microfacet.numerics import one_minus_exp
 from ...microfacet.quadrature import integrate
-from .grains import exposure, visible_fraction
+from .grains import exposure
 from .shadows import inclination, silhouette
 
 HEIGHTS = 12
-TINY = 1e-7
 
 
 def masking(r, w):
@@ -29,7 +28,7 @@ def masking(r, w):
         return (2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha) * exposure(r, h, 0),)
 
     (projected,) = integrate(width, HEIGHTS, (r, sin, cos), r * cos)
-    return dr.minimum(cos * filling_factor(r) / (dr.maximum(r, TINY) * projected), 1)
+    return dr.minimum(cos * filling_factor(r) / (r * projected), 1)
 
 
 def masking_shadowing(r, i, o):
@@ -38,18 +37,23 @@ def masking_shadowing(r, i, o):
 
 
 def filling_factor(r):
-    """tau_0, kept off zero."""
-    return one_minus_exp(dr.pi * dr.maximum(r, TINY))
+    """tau_0."""
+    return one_minus_exp(dr.pi * r)
 
 
 def grain_weight(r, i, o):
     """w+(i, o), the share of the grains among what both directions see (Lucas 2023; 2024, Eq. 4)."""
-    return 1 - pore_weight(r, i, o)
+    return one_minus_exp(_pore_depth(r, i, o))
 
 
 def pore_weight(r, i, o):
     """1 - w+(i, o) = (1 - tau_i) (1 - tau_o) / (1 - tau_0)."""
-    return (1 - visible_fraction(r, i)) * (1 - visible_fraction(r, o)) * dr.exp(dr.pi * r)
+    return dr.exp(-_pore_depth(r, i, o))
+
+
+def _pore_depth(r, i, o):
+    """All three factors are exponentials."""
+    return r * (dr.pi / 2) * (1 / inclination(i)[1] + 1 / inclination(o)[1])
 
 
 def visible_masking(w):

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 
 from ...microfacet.quadrature import gauss_legendre
 
 LOST = 1e-3
 """Share of the ground whose grooves may need more bounces than the default of max_bounces."""
+MOST = 1000
+"""Bounces that are followed at most; more than the default for alpha up to 20 (GGX)."""
 
 
 def needed_bounces(distribution, alpha: float, lost: float = LOST) -> int:
-    """Bounces that suffice in all symmetric grooves but the steepest, a share ``lost``."""
-    return math.ceil(math.pi / (2 * math.atan(1 / distribution.slope(alpha, lost))))
+    """Bounces that suffice in all symmetric grooves but the steepest, a share ``lost``; at most `MOST`."""
+    return min(math.ceil(math.pi / (2 * math.atan(1 / distribution.slope(alpha, lost)))), MOST)
 
 
 def needed_bounces_nonsymmetric(distribution, alpha: float, lost: float = LOST) -> int:
     """The same for facets of independent tilts, of which both are seldom steep; never more than of symmetric ones."""
-    n, most = 2, needed_bounces(distribution, alpha, lost)
-    while n < most and narrow(distribution, alpha, math.pi / n) > lost:
-        n += 1
-    return min(n, most)
+    every = range(2, needed_bounces(distribution, alpha, lost))  # fewer and fewer grooves need more and more
+    return 2 + bisect_left(every, True, key=lambda n: narrow(distribution, alpha, math.pi / n) <= lost)
 
 
 def narrow(distribution, alpha: float, aperture: float, nodes: int = 24) -> float:

@@ -13,8 +13,9 @@ from ...conductors import Conductor
 from ...errors import ParameterError
 from ...microfacet.distributions import DISTRIBUTIONS, Profile, sample_azimuth
 from ...microfacet.fresnel import conductor
-from ...parameters import Choice, Declared, Flag, Integer, Texture, conflict, numbers
-from .bounces import needed_bounces, needed_bounces_nonsymmetric
+from ...microfacet.numerics import clamp
+from ...parameters import Choice, Declared, Flag, Integer, Texture, conflict, numbers, varies
+from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Metal, fit
 from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric_bounces
 from .microgeometry import ExplicitGrooves
@@ -49,13 +50,13 @@ class VGroove(Declared):
     citation = CITATION
 
     distribution = Choice("distribution of the facets' normals", options=tuple(DISTRIBUTIONS))
-    alpha = Texture("roughness, never squared; at most 1 for Phong", 0.3, open_low=True)
-    alpha_u = Texture("roughness along x, instead of alpha", None, open_low=True)
-    alpha_v = Texture("roughness along y, instead of alpha", None, open_low=True)
-    exponent = Texture("Phong's exponent, instead of alpha: 2 / alpha² - 2", None)
+    alpha = Texture("roughness, never squared; at most 1 for Phong", 0.3, low=SMOOTHEST, high=1e3)
+    alpha_u = Texture("roughness along x, instead of alpha", None, low=SMOOTHEST, high=1e3)
+    alpha_v = Texture("roughness along y, instead of alpha", None, low=SMOOTHEST, high=1e3)
+    exponent = Texture("Phong's exponent, instead of alpha: 2 / alpha² - 2", None, high=1e6)
     metal = Conductor("metal of the facets", "none")
     symmetric = Flag("whether both facets of a groove have the same tilt, or independent ones", True)
-    max_bounces = Integer("light that bounces more often is lost; by default 0.1 % of it, or less", None, low=1)
+    max_bounces = Integer("more often bounced light is lost; by default 0.1 % of it, or less", None, low=1, high=MOST)
 
     @classmethod
     def microgeometry(cls, description: dict[str, Any]) -> ExplicitGrooves:
@@ -70,9 +71,10 @@ class VGroove(Declared):
         if "exponent" in given and self.distribution != "phong":
             raise ParameterError(f"exponent: Phong's, but distribution = {self.distribution!r}; give alpha instead.")
         self.isotropic = not {"alpha_u", "alpha_v"} & given
-        self.alphas = () if self.exponent else (self.alpha_u or self.alpha, self.alpha_v or self.alpha)
+        self.axes = ["alpha" if getattr(self, name) is None else name for name in ("alpha_u", "alpha_v")]
+        self.axes = [] if self.exponent else self.axes
         for name in ("alpha", "alpha_u", "alpha_v"):
-            if getattr(self, name) not in self.alphas:
+            if name not in self.axes:
                 setattr(self, name, None)
         self.check()
 
@@ -83,7 +85,9 @@ class VGroove(Declared):
             if (alpha := getattr(self, name)) is not None and self.distribution == "phong":
                 high = max((shown.max() for _, shown in numbers(alpha)), default=0)
                 if high > 1:
-                    raise ParameterError(f"{name} = {high:g}: expected a number or texture in (0, 1] for Phong.")
+                    raise ParameterError(
+                        f"{name} = {high:g}: expected a number or texture in [{SMOOTHEST:g}, 1] for Phong."
+                    )
 
     def components(self) -> list[int]:
         """One glossy lobe."""
@@ -147,22 +151,31 @@ class VGroove(Declared):
         return mi.Vector3f(length * sin * x + along * y, length * sin * y - along * x, length * cos), k
 
     def _alphas(self, si, active) -> tuple[Any, Any]:
-        # Ranges were checked where values could be seen. Vertex attributes and an optimiser's steps could not.
-        if self.exponent:
-            alpha = dr.sqrt(2 / (dr.maximum(self.exponent.eval_1(si, active), 0) + 2))
-            return dr.maximum(alpha, SMOOTHEST), dr.maximum(alpha, SMOOTHEST)
+        if not self.axes:
+            alpha = dr.sqrt(2 / (self.number("exponent", si, active) + 2))
+            return alpha, alpha
         largest = DISTRIBUTIONS[self.distribution].largest
-        u, v = (dr.clip(alpha.eval_1(si, active), SMOOTHEST, largest) for alpha in self.alphas)
+        u, v = (clamp(self.number(name, si, active), SMOOTHEST, largest) for name in self.axes)
         return u, v
 
     def _profile(self, si, active, cos_azimuth, sin_azimuth) -> Profile:
         return Profile.along(DISTRIBUTIONS[self.distribution], cos_azimuth, sin_azimuth, *self._alphas(si, active))
 
     def _roughest(self) -> float:
-        """Largest roughness: of the numbers that Mitsuba shows of a texture, else its mean."""
+        """Largest roughness: of the numbers that Mitsuba shows of a texture, else of all that are allowed."""
         if self.exponent:
-            return math.sqrt(2 / (max(_extremes(self.exponent)[0], 0) + 2))
-        return max(_extremes(alpha)[1] for alpha in self.alphas)
+            return math.sqrt(2 / (self._extremes("exponent")[0] + 2))
+        return min(max(self._extremes(name)[1] for name in self.axes), DISTRIBUTIONS[self.distribution].largest)
+
+    def _extremes(self, name: str) -> tuple[float, float]:
+        declared = getattr(type(self), name)
+        shown = [found for _, found in numbers(getattr(self, name), differentiated=True)]
+        shown = np.clip(
+            np.concatenate([found.ravel() for found in shown] or [[declared.low, declared.high]]),
+            declared.low,
+            declared.high,
+        )
+        return float(shown.min()), float(shown.max())
 
     def _metal(self, si, active) -> Metal | None:
         if self.metal.mirror:
@@ -178,17 +191,12 @@ class VGroove(Declared):
         """ln F's fit if it is the same everywhere, for good: else it takes 7 Fresnel terms a call."""
         parts = [part for part in vars(self.metal).values() if part is not None]
         differentiated = any(dr.grad_enabled(value) for part in parts for _, value in mi.traverse(part).items())
-        if not parts or mi.is_spectral or differentiated or any(part.is_spatially_varying() for part in parts):
+        if not parts or mi.is_spectral or differentiated or any(map(varies, parts)):
             return None
         eta, k = self.metal.eval(dr.zeros(mi.SurfaceInteraction3f), True)
         logarithm = fit(lambda cos: conductor(cos, eta, k))
         dr.make_opaque(logarithm)
         return logarithm
-
-
-def _extremes(texture) -> tuple[float, float]:
-    shown = [found for _, found in numbers(texture, differentiated=True)] or [np.asarray(dr.detach(texture.mean()))]
-    return float(min(found.min() for found in shown)), float(max(found.max() for found in shown))
 
 
 def _more_numbers(sample1, sample2):
