@@ -128,7 +128,7 @@ class Texture(Parameter):
     def holds(self, value: float) -> bool:
         """Whether a number is in range, as arrays hold it; NaN and infinity never are."""
         with np.errstate(over="ignore"):
-            low, value, high = np.float32([self.low, value, self.high])
+            low, value, high = np.array([self.low, value, self.high], dtype=np.float32)
         return bool(np.isfinite(value) and low <= value <= high)
 
     def clamp(self, value: Any) -> Any:

@@ -118,8 +118,9 @@ class Azimuth:
         x, y = heading(i.x, i.y)
         cross = x * o.y - y * o.x
         angle = dr.atan2(dr.abs(cross), x * o.x + y * o.y + 1e-12)  # squared in the derivative
-        radii = (dr.sqrt(w.x * w.x + w.y * w.y + 1e-14) for w in (i, o))
-        return cls(i, o, *radii, (x, y), dr.select(cross < 0, type(cross)(-1), 1), angle, *dr.sincos(angle))
+        radius_i, radius_o = (dr.sqrt(w.x * w.x + w.y * w.y + 1e-14) for w in (i, o))
+        sin, cos = dr.sincos(angle)
+        return cls(i, o, radius_i, radius_o, (x, y), dr.select(cross < 0, type(cross)(-1), 1), angle, sin, cos)
 
     def arcs(self, h):
         """Start and end of the two lit arcs; the second one is there when light comes from behind, else it is empty."""

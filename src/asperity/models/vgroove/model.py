@@ -169,13 +169,9 @@ class VGroove(Declared):
 
     def _extremes(self, name: str) -> tuple[float, float]:
         declared = getattr(type(self), name)
-        shown = [found for _, found in numbers(getattr(self, name), differentiated=True)]
-        shown = np.clip(
-            np.concatenate([found.ravel() for found in shown] or [[declared.low, declared.high]]),
-            declared.low,
-            declared.high,
-        )
-        return float(shown.min()), float(shown.max())
+        shown = [found.ravel() for _, found in numbers(getattr(self, name), differentiated=True)]
+        found = np.concatenate(shown) if shown else np.array([declared.low, declared.high])
+        return float(max(found.min(), declared.low)), float(min(found.max(), declared.high))
 
     def _metal(self, si, active) -> Metal | None:
         if self.metal.mirror:

@@ -36,7 +36,9 @@ def nonsymmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None)
     pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
     captured = pair, profile, pole, () if metal is None else waves(metal.logarithm, pair.length)
 
-    def with_bounces(totals, count, numbers, nodes, double):
+    def with_bounces(totals, counted, nodes, double):
+        count, numbers = counted
+
         def term(index, captured):
             (k, odd, tau), (pair, profile, pole, through) = numbers(index), captured
             p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
@@ -56,8 +58,8 @@ def nonsymmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None)
     few, double, multiple = NODES[profile.kind]
     single, below = _single(pair, profile, few), limits(pair)
     totals = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
-    totals = with_bounces(totals, *numbered(below, dr.minimum(most, type(most)(2))), double, True)
-    totals = with_bounces(totals, *numbered(below, most, lowest=(3, 3, 4, 4)), multiple, False)
+    totals = with_bounces(totals, numbered(below, dr.minimum(most, type(most)(2))), double, True)
+    totals = with_bounces(totals, numbered(below, most, lowest=(3, 3, 4, 4)), multiple, False)
     scale = dr.rcp(4 * cos_i * pair.cos_delta * (profile.scale * profile.kind.partner(profile.alpha)))
     return scale * totals[-1], scale * totals[0]
 
