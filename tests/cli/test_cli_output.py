@@ -101,10 +101,11 @@ def test_inputs_are_never_overwritten(asperity, inputs, command):
     assert contents() == before
 
 
-def test_an_input_keeps_its_default_name(asperity, tmp_path):
-    np.savez("waves.npz", np.zeros((4, 4)))
+def test_an_input_may_have_the_default_name(asperity, inputs):
+    Path("in/map.exr").rename("asperity.exr")
     before = contents()
-    asperity("measure", "heightfield", "waves.npz", "--spacing", "1", "--paths", "100", "--tiles", "2")
+    result = asperity(*RENDER, "--env", "asperity.exr", "--force")
+    assert result.exit_code == 0 and "asperity-2.png and asperity-2.exr" in result.output
     assert before.items() <= contents().items()
 
 

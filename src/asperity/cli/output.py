@@ -18,7 +18,10 @@ from asperity.files import TakenError, atomically, locked
 if TYPE_CHECKING:
     import numpy as np
 
-Force = Annotated[bool, typer.Option("--force", help="Overwrite what is there already.")]
+Force = Annotated[
+    bool,
+    typer.Option("--force", help="Overwrite. Without it, what -o names must be new, and default names get numbers."),
+]
 
 NAME = Path("asperity")
 FORMATS = (".png", ".exr")
