@@ -1,6 +1,9 @@
 """Signals that ask for an end, and pictures that are kept."""
 
 import signal
+import subprocess
+import sys
+import time
 
 import mitsuba as mi
 import pytest
@@ -54,3 +57,21 @@ def test_one_pass_is_rendered_however_early_the_signal():
     )
     [image], done = passes.average([scene], 4, 0, [signal.SIGTERM])
     assert done == 4 and image.min() > 0
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no such signal")
+def test_a_closed_terminal_keeps_the_picture(tmp_path):
+    """The job is hung up, and all that it prints from then on fails."""
+    render = ("render", "--size", "64", "--spp", "1000000", "-o", "out.exr")
+    in_a_terminal = ("-c", "import pty, sys; pty.spawn(sys.argv[1:])", sys.executable, "-m", "asperity", *render)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "cwd": tmp_path}
+    with subprocess.Popen([sys.executable, *in_a_terminal], **pipes) as terminal:
+        seen = b""
+        while b"rendering" not in seen:
+            seen += (more := terminal.stdout.read1())
+            assert more, seen
+        terminal.kill()
+    end = time.monotonic() + 60
+    while [path.name for path in tmp_path.iterdir()] != ["out.exr"]:
+        assert time.monotonic() < end
+        time.sleep(0.05)

@@ -54,6 +54,9 @@ def test_reports_are_not_overwritten(asperity, tmp_path, monkeypatch):
     result = asperity("validate", "micrograin", "-o", "empty")
     assert result.exit_code == 2 and "-o empty: it exists, and is not empty" in result.stderr
     assert asperity("validate", "micrograin", "-o", "empty", "--force").exit_code == 0
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir("here")
+    assert asperity("validate", "micrograin", "-o", ".").exit_code == 0
     assert not list(tmp_path.glob(".*"))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
@@ -46,7 +46,7 @@ def files(
     never overwritten: paths, what the scenes among them name, and what options (words) name.
     """
     named = out is not None and not out.is_dir()
-    path = out if out is not None and named else default if out is None else out / default.name
+    path = default if out is None else out if named else out / default.name
     if path.suffix and path.suffix.lower() not in formats:
         raise ParameterError(f"{option} {path}: the ending is {path.suffix!r}. Allowed: {', '.join(formats)}.")
     check_folder(path, option)
@@ -67,13 +67,15 @@ def folder(out: Path | None, default: Path, *, force: bool = False, option: str 
         full = any(path.iterdir()) if path.is_dir() else path.exists()
         return "it exists, and is not empty. Take another, or --force." if full and not force else None
 
-    candidates = ([path.with_name(f"{path.name}{n}")] for n in numbers())
+    candidates = ([path.with_name(f"{path.name}{n}") if n else path] for n in numbers())
     with first_free(candidates, out is not None, taken, option) as found:
         yield found[0]
 
 
 @contextmanager
-def first_free(candidates, named, complaint, option) -> Iterator[list[Path]]:
+def first_free(
+    candidates: Iterable[list[Path]], named: bool, complaint: Callable[[Path], str | None], option: str
+) -> Iterator[list[Path]]:
     """The first candidates that nobody complains of, locked; if they were named, the first ones must do."""
     for paths in candidates:
         with ExitStack() as stack:
