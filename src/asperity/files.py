@@ -1,19 +1,68 @@
-"""Files that are whole, or not there."""
+"""Files that are whole, or not there, and that one command at a time writes."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from .errors import AsperityError
+
+try:
+    import fcntl
+except ImportError:  # on Windows, where nothing is locked
+    fcntl = None  # type: ignore[assignment]
+
+
+class TakenError(AsperityError):
+    """A file that must not be written: it is there, or somebody else is writing it."""
 
 
 @contextmanager
 def atomically(path: Path) -> Iterator[Path]:
-    """A file beside ``path`` to write to, which takes its place in the end, or vanishes."""
+    """A file beside ``path`` to write to, which takes its place in the end, or vanishes.
+
+    A link stays one: the file that it leads to is replaced.
+    """
+    path = Path(os.path.realpath(path))
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     try:
         yield part
+        if path.exists():
+            shutil.copymode(path, part)
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Keep others who lock ``path`` from writing it meanwhile; raises TakenError if one of them does so now.
+
+    The lock is a hidden file beside it. The system unlocks it when the process ends, however it ends.
+    """
+    real = Path(os.path.realpath(path))
+    lock = real.with_name(f".{real.name}.lock")
+    while fcntl is not None:
+        # Reading is enough to lock, and all that one may do to a file that another user's killed process left.
+        file = os.open(lock, os.O_RDONLY | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(file)
+            raise TakenError(f"{path}: another asperity is writing it.") from None
+        except OSError:  # a file system without locks
+            pass
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(file), os.stat(lock)):
+                break
+        os.close(file)  # of a lock that was given back, and removed, just before
+    try:
+        yield
+    finally:
+        if fcntl is not None:
+            with suppress(OSError):
+                lock.unlink()
+            os.close(file)

@@ -2,13 +2,18 @@ import errno
 import os
 import re
 import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from asperity.cli import app, console
+from asperity.files import locked
 from asperity.goniophotometer import Measurement
 
 QUICK = ("--paths", "2e4", "--tiles", "4")
@@ -98,13 +103,17 @@ def test_a_preset_and_a_tensor_file(asperity):
     mi.load_dict({"type": "measured", "filename": "gold.bsdf"})
 
 
-def test_continue_adds_paths_to_the_file(asperity):
+def test_continue_goes_on_to_the_paths_that_are_asked_for(asperity):
     works(asperity(*GRAINS, "-o", "grains"))
-    works(asperity(*GRAINS, "--continue", "grains.npz"))
+    assert "had them already" in works(asperity(*GRAINS, "--continue", "grains.npz"))
+    works(asperity(*GRAINS, "--paths", "4e4", "--continue", "grains.npz"))
     works(asperity(*GRAINS, "--paths", "4e4", "-o", "once"))
     twice, once = Measurement.load("grains.npz"), Measurement.load("once.npz")
     assert np.array_equal(twice.paths, once.paths)
     assert np.allclose(twice.albedo.value, once.albedo.value, atol=6 * once.albedo.error.max())
+    assert "there are 40000 per direction already" in asperity(*GRAINS, "--continue", "grains.npz").stderr
+    works(asperity(*GRAINS, "--paths", "6e4", "--continue", "grains.npz", "-o", "more"))
+    assert Measurement.load("more.npz").total_paths == 18e4 and Measurement.load("grains.npz").total_paths == 12e4
 
 
 def test_merge_is_exact(asperity):
@@ -134,6 +143,66 @@ def test_ctrl_c_keeps_what_was_measured(asperity, tmp_path, monkeypatch):
     works(asperity("plot", "micrograin.npz"))
 
 
+JOB = ("measure", "micrograin", "--set", "tau_0=0.5", "--theta", "30", "--paths", "3e5", "--tiles", "60")
+COMMAND = (sys.executable, "-m", "asperity", *JOB, "-o", "job.npz", "--checkpoint", "0")
+IN_A_TERMINAL = (sys.executable, "-c", "import pty, sys; pty.spawn(sys.argv[1:])", *COMMAND)
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory):
+    """The file of the job."""
+    path = tmp_path_factory.mktemp("job") / "whole.npz"
+    works(CliRunner().invoke(app, [*JOB, "-o", str(path)]))
+    return Measurement.load(path)
+
+
+def wait_for(condition):
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no such signals")
+@pytest.mark.parametrize("name, command", [*((n, COMMAND) for n in ("TERM", "HUP", "KILL")), ("KILL", IN_A_TERMINAL)])
+def test_a_job_that_is_ended_goes_on_to_the_same_bits(asperity, tmp_path, uninterrupted, name, command):
+    """Killing the terminal hangs up the job in it."""
+    with open("log", "w") as log, subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log) as job:
+        wait_for(Path("job.npz").exists)
+        job.send_signal(signal.Signals[f"SIG{name}"])
+        job.wait(60)
+    if name == "KILL" and command is COMMAND:
+        assert files(tmp_path) == [".job.npz.lock", "job.npz", "log"]  # a lock that the system has opened
+    else:
+        assert command is IN_A_TERMINAL or (job.returncode == 0 and "stopped early" in Path("log").read_text())
+        wait_for(lambda: files(tmp_path) == ["job.npz", "log"])
+    part = Measurement.load("job.npz")
+    assert 0 < part.total_paths < 3e5 and not part.finished
+    works(asperity(*JOB[:-4], "--continue", "job.npz"))  # the file knows its paths and tiles
+    whole = Measurement.load("job.npz")
+    assert whole.finished and files(tmp_path) == ["job.npz", "log"]
+    assert all(np.array_equal(getattr(whole, n), getattr(uninterrupted, n)) for n in ("energy", "paths", "goal"))
+
+
+def test_a_log_gets_lines(asperity, monkeypatch):
+    assert asperity(*GRAINS).stderr == ""
+    monkeypatch.setattr(console, "INTERVAL", 0)
+    lines = asperity(*GRAINS).stderr.splitlines()
+    assert len(lines) == 12 and re.fullmatch(r"0\.1/0\.1 million paths, \S+ paths/s, about 0:\d\d:\d\d left", lines[-1])
+
+
+def test_one_at_a_time(asperity, tmp_path):
+    works(asperity(*GRAINS, "-o", "grains"))
+    before = Path("grains.npz").read_bytes()
+    with locked(Path("grains.npz")), locked(Path("micrograin.npz")):
+        for options in (("--continue", "grains.npz"), ("-o", "grains", "--force")):
+            assert "another asperity is writing it" in asperity(*GRAINS, *options).stderr
+        assert "micrograin-2.npz" in works(asperity(*GRAINS))
+    assert Path("grains.npz").read_bytes() == before
+    works(asperity(*GRAINS, "--continue", "grains.npz"))
+    assert files(tmp_path) == ["grains.npz", "micrograin-2.npz"]
+
+
 BAD = [
     (("measure",), "give one of"),
     (("measure", "micrograin", "--preset", "gold-dust"), "give one of"),
@@ -157,7 +226,28 @@ BAD = [
     ((*GRAINS, "--bsdf", GOLD), "bsdf: makes no sense with micrograin"),
     ((*GRAINS, "-o", "none/out.npz"), "cannot write into the folder 'none'"),
     ((*GRAINS, "--tensor", "none/out.bsdf"), "cannot write into the folder 'none'"),
-    ((*GRAINS, "-o", "."), "it is a folder"),
+    ((*GRAINS, "-o", "broken.npz"), "-o broken.npz: it exists. Take another name, or --force"),
+    ((*GRAINS, "--tensor", "old.bsdf"), "--tensor old.bsdf: it exists"),
+    (
+        (
+            "measure",
+            "mesh",
+            "roof.obj",
+            "--bsdf",
+            '{"type": "measured", "filename": "old.bsdf"}',
+            "--tensor",
+            "old.bsdf",
+            "--force",
+        ),
+        "old.bsdf: it is an input",
+    ),
+    ((*GRAINS, "--continue", "old.npz", "-o", "broken.npz"), "-o broken.npz: it exists"),
+    (("merge", "broken.npz", "-o", "broken.npz", "--force"), "-o broken.npz: it is an input of this command"),
+    (
+        (*GRAINS, "--tiles", "1000000000"),
+        "tiles = 1000000000: with 3 directions of incidence, 1 orders apart, 2048 cells",
+    ),
+    ((*GRAINS, "--cells", "4096x4096", "--apart", "1000"), "GiB of memory, and this machine has"),
     ((*GRAINS, "-o", "out.csv"), "'.csv'. Allowed: .npz"),
     ((*GRAINS, "--continue", "none.npz"), "'none.npz': there is no such file"),
     ((*GRAINS, "--continue", "broken.npz"), "'broken.npz': not written by asperity"),
@@ -178,7 +268,7 @@ BAD = [
 
 @pytest.mark.parametrize("arguments, culprit", BAD, ids=[" ".join(arguments) for arguments, _ in BAD])
 def test_bad_input(asperity, tmp_path, arguments, culprit):
-    for name, content in {"roof.obj": ROOF, "gold.json": GOLD, "broken.npz": "no archive"}.items():
+    for name, content in {"roof.obj": ROOF, "gold.json": GOLD, "broken.npz": "no archive", "old.bsdf": ""}.items():
         (tmp_path / name).write_text(content)
     before = files(tmp_path)
     result = asperity(*arguments)
@@ -208,12 +298,15 @@ def test_a_full_disk_keeps_what_was_measured_elsewhere(asperity, tmp_path, monke
     replace = os.replace
 
     def full(source, target):
-        if target.name == "full.npz" and target.parent == Path("."):
+        if target.name == "full.npz" and target.parent == tmp_path:
             raise OSError(errno.ENOSPC, "No space left on device")
         replace(source, target)
 
     monkeypatch.setattr("asperity.files.os.replace", full)
-    output = works(asperity(*GRAINS, "--theta", "30", "--continue", "full.npz"))
+    output = works(asperity(*GRAINS, "--theta", "30", "--continue", "full.npz", "--paths", "4e4", "--checkpoint", "0"))
     rescued = re.search(r"Kept as (\S+full\.npz)", output)[1]
-    assert "No space left" in output and Measurement.load(rescued).total_paths == 2 * before.total_paths
+    assert (
+        "no checkpoint: cannot write full.npz: No space left" in output
+        and Measurement.load(rescued).total_paths == 2 * before.total_paths
+    )
     assert np.array_equal(Measurement.load("full.npz").energy, before.energy) and files(tmp_path) == ["full.npz"]

@@ -1,11 +1,13 @@
 """`asperity validate`, with a paper of one claim: the papers' own are in tests/validation."""
 
+import inspect
 import signal
 
+import mitsuba as mi
 import pytest
 
 from asperity import validation
-from asperity.validation.report import Finding, Section
+from asperity.validation.report import Effort, Finding, Section
 
 
 def paper(*verdicts, interrupt=False):
@@ -41,3 +43,73 @@ def test_an_unknown_model_and_a_file_in_the_way(asperity, tmp_path):
     (tmp_path / "report").write_text("mine")
     assert asperity("validate", "micrograin", "-o", "report").exit_code == 2
     assert (tmp_path / "report").read_text() == "mine"
+
+
+def test_reports_are_not_overwritten(asperity, tmp_path, monkeypatch):
+    monkeypatch.setitem(validation.PAPERS, "micrograin", paper(True))
+    for name in ("asperity-validate-micrograin", "asperity-validate-micrograin-2"):
+        assert f"{name}/report.md" in asperity("validate", "micrograin").output
+    (tmp_path / "empty").mkdir()
+    assert asperity("validate", "micrograin", "-o", "empty").exit_code == 0
+    result = asperity("validate", "micrograin", "-o", "empty")
+    assert result.exit_code == 2 and "-o empty: it exists, and is not empty" in result.stderr
+    assert asperity("validate", "micrograin", "-o", "empty", "--force").exit_code == 0
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir("here")
+    assert asperity("validate", "micrograin", "-o", ".").exit_code == 0
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
+def test_a_section_that_is_interrupted_is_left_out(asperity, tmp_path, monkeypatch, end):
+    """Long before it would be done, and what was done before it is there even if it fails."""
+
+    def sections(effort):
+        yield Section("first", "", [Finding("claim", "1", "1", True)])
+        assert "first" in (tmp_path / "report" / "report.md").read_text()
+        yield endless(effort)
+
+    def endless(effort):
+        signal.raise_signal(end)
+        while True:
+            effort.tick()
+
+    monkeypatch.setitem(validation.PAPERS, "micrograin", sections)
+    result = asperity("validate", "micrograin", "-o", "report")
+    text = (tmp_path / "report" / "report.md").read_text()
+    assert result.exit_code == 1 and "Stopped early" in result.output and "Stopped early" in text and "first" in text
+
+
+def sections():
+    """All functions that make a section by measuring; that of the phase function takes a fifth of a second in all."""
+    for module in (validation.lambertsphere, validation.micrograin, validation.vgroove):
+        for name, function in vars(module).items():
+            given = inspect.signature(function).parameters if inspect.isfunction(function) else {}
+            if (
+                name != "phase_function"
+                and {"effort", "tick"} & given.keys()
+                and inspect.signature(function).return_annotation == "Section"
+            ):
+                yield pytest.param(function, given, id=f"{module.__name__.rpartition('.')[2]}-{name}")
+
+
+@pytest.mark.parametrize("section, given", list(sections()))
+@pytest.mark.filterwarnings("ignore:theta = 38")  # spheres far apart
+def test_every_section_can_be_interrupted(section, given):
+    class StopError(Exception):
+        pass
+
+    def tick(*_):
+        raise StopError
+
+    mi.set_variant("llvm_ad_rgb")
+    known = {
+        "figure": "7",
+        "kind": "",
+        "material": {},
+        "tolerance": 0,
+        "effort": Effort(3200, 32, 0, tick),
+        "tick": tick,
+    }
+    with pytest.raises(StopError):
+        section(**{name: value for name, value in known.items() if name in given})

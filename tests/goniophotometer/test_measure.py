@@ -1,5 +1,7 @@
 """The instrument: energy, errors, seeds, and what it refuses."""
 
+import sys
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 from scipy import stats
 
 import asperity  # noqa: F401
-from asperity.errors import AsperityError, ParameterError, UnknownNameError, UnreadableFileError
+from asperity.errors import AsperityError, ParameterError, UnknownNameError
 from asperity.goniophotometer import Hemisphere, Measurement, Points, Window, measure, merge
 from asperity.goniophotometer.sensors import directions, from_description
 from asperity.lab import evaluate
@@ -98,7 +100,7 @@ def test_merging_and_continuing():
     both = merge([a, b])
     assert np.array_equal(both.energy, merge([b, a]).energy)
     assert np.array_equal(both.energy.sum(axis=0), a.energy.sum(axis=0) + b.energy.sum(axis=0))
-    more = measure(geometry, [(30, 0), (60, 0)], seed=1, before=a, **FEW)
+    more = measure(geometry, [(30, 0), (60, 0)], seed=1, before=a, paths=2**17, tiles=8)
     assert more.total_paths == 2 * a.total_paths and np.all(more.energy >= a.energy)
     assert a.total_paths == 2 * FEW["paths"]  # untouched
     with pytest.raises(ParameterError, match="seed 1 is there twice"):
@@ -109,7 +111,7 @@ def test_merging_and_continuing():
         measure(geometry, [(31, 0), (60, 0)], before=a, **FEW)
 
 
-def test_stopping_keeps_what_there_is(tmp_path):
+def test_stopping_keeps_what_there_is():
     seen = []
     measured = measure(
         ExplicitGrains(0.4, base=WHITE),
@@ -120,37 +122,26 @@ def test_stopping_keeps_what_there_is(tmp_path):
     )
     assert seen[-1] == (3 * 2**13, 2**16) and measured.total_paths == 3 * 2**13
     assert measured.total_albedo.value[0, 0] == pytest.approx(1, abs=1e-4)
-    measured.save(tmp_path / "part.npz")
-    rest = measure(ExplicitGrains(0.4, base=WHITE), [(30, 0)], before=Measurement.load(tmp_path / "part.npz"), **FEW)
-    assert rest.total_paths == measured.total_paths + FEW["paths"]
+    assert not measured.finished
 
 
-def test_files(tmp_path):
-    path = tmp_path / "grains.npz"
-    measured = measure(ExplicitGrains(0.4), [(30, 0), (60, 20)], sensor=Window("retro", 5, 4), apart=2, **FEW)
-    measured.save(path)
-    loaded = Measurement.load(path)
-    assert loaded.about == measured.about and loaded.sensor == measured.sensor
-    assert all(np.array_equal(getattr(loaded, n), getattr(measured, n)) for n in ("energy", "paths", "labels"))
-    with np.load(path) as file:
-        assert file["values"].shape == file["errors"].shape == (2, 2, 16, 3)
-        assert file["wo"].shape == (2, 16, 3) and list(file["orders"]) == [1, 2]
-    assert [p.name for p in tmp_path.iterdir()] == ["grains.npz"]
-
-
-@pytest.mark.parametrize("content", [b"", b"no archive", None])
-def test_unreadable_files(tmp_path, content):
-    path = tmp_path / "x.npz"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(UnreadableFileError, match=r"x\.npz"):
-        Measurement.load(path)
-
-
-def test_archives_of_others_are_refused(tmp_path):
-    np.savez(tmp_path / "x.npz", a=1)
-    with pytest.raises(UnreadableFileError, match="not written by asperity"):
-        Measurement.load(tmp_path / "x.npz")
+@pytest.mark.parametrize("sensor", [None, Points(((10.0, 0.0), (40.0, 90.0), (70.0, 180.0)))])
+def test_where_it_was_stopped_does_not_matter(monkeypatch, tmp_path, sensor):
+    # Three batches for each of two directions on each of two tiles; the last ones are smaller.
+    monkeypatch.setattr(sys.modules["asperity.goniophotometer.measure"], "BATCH", 1000)
+    geometry, incident = ExplicitGrains(0.4, grain=GREY, base=GREY), [(30, 0), (60, 0)]
+    few = {"sensor": sensor, "paths": 5000, "tiles": 2, "interval": 0}
+    parts = []
+    once = measure(geometry, incident, checkpoint=parts.append, **few)
+    assert once.finished and [part.total_paths for part in parts] == sorted({part.total_paths for part in parts})
+    for k, part in enumerate(parts[:-1]):
+        assert not part.finished
+        part.save(tmp_path / f"{k}.npz")
+        rest = measure(geometry, incident, sensor=sensor, before=Measurement.load(tmp_path / f"{k}.npz"))
+        assert np.array_equal(rest.paths, once.paths) and np.array_equal(rest.energy, once.energy)
+    assert np.array_equal(measure(geometry, incident, sensor=sensor, before=once).energy, once.energy)
+    with pytest.raises(ParameterError, match="paths = 4000: there are 500"):
+        measure(geometry, incident, sensor=sensor, before=once, paths=4000)
 
 
 @pytest.mark.parametrize(

@@ -37,9 +37,8 @@ def measured(bsdf, incident, sensor=None, channels=("R", "G", "B"), seen=None):
     energy = np.zeros((2, len(wi), 1, sensor.cells + EXTRA, len(channels)), dtype=np.uint64)
     energy[:, :, 0, :-EXTRA] = means * sensor.solid_angle * PATHS / UNIT + 0.5
     about = {"sensor": sensor.describe(), "channels": list(channels)}
-    return Measurement(
-        about, np.array(incident, dtype=float), np.array([[0, 0], [0, 1]]), np.full((2, len(wi)), PATHS), energy
-    )
+    labels, paths = np.array([[0, 0], [0, 1]]), np.full((2, len(wi)), PATHS)
+    return Measurement(about, np.array(incident, dtype=float), labels, paths, energy, paths[:, 0])
 
 
 def written(measurement, folder):

@@ -14,7 +14,7 @@ from rich.text import Text
 from asperity.errors import ParameterError, UnknownNameError
 from asperity.files import atomically
 
-from . import console, materials, variants
+from . import console, materials, output, variants
 
 VERDICT = {True: ("passed", "green"), False: ("failed", "bold red"), None: ("skipped", "dim")}
 
@@ -73,7 +73,6 @@ def draw(failures: list[Any], name: str, folder: Path) -> None:
         if result.evidence is not None:
             folder.mkdir(parents=True, exist_ok=True)
             slug = re.sub(r"\W+", "-", unicodedata.normalize("NFKD", result.name))  # chi², with a plain 2
-            path = folder / f"{name}-{slug}.png"
-            with atomically(path) as part:
+            with output.files(folder, Path(f"{name}-{slug}.png"), (".png",)) as [path], atomically(path) as part:
                 pictures.draw(result, part)
             typer.echo(path)

@@ -6,7 +6,8 @@ import json
 import tempfile
 import time
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,8 +17,7 @@ from rich.table import Table
 
 from asperity.errors import ParameterError, UnknownNameError
 
-from . import console, materials, passes, registry, variants
-from .output import writable
+from . import console, materials, output, passes, registry, variants
 
 if TYPE_CHECKING:
     from asperity.goniophotometer import Measurement, Microgeometry
@@ -62,6 +62,7 @@ def counts(text: str) -> list[int]:
 
 
 def measure(
+    ctx: typer.Context,
     target: Annotated[str | None, typer.Argument(metavar="WHAT", help="A model; or mesh; or heightfield.")] = None,
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="Of the mesh, or the height field.")] = None,
     settings: materials.Settings = None,
@@ -75,7 +76,7 @@ def measure(
     phi: Annotated[Any, typer.Option(parser=numbers, metavar="DEGREES", help="Every theta gets every phi.")] = "0",
     orders: Annotated[int | None, typer.Option(min=1, help="Highest order of scattering; all if left out.")] = None,
     apart: Annotated[int, typer.Option(min=1, help="How many orders are counted apart.")] = 1,
-    paths: Annotated[float, typer.Option(help="Per direction of incidence.")] = 4e6,
+    paths: Annotated[float | None, typer.Option(help="Per direction of incidence, in all; 4e6 if left out.")] = None,
     tiles: Annotated[int | None, typer.Option(min=2, help="How many pieces of surface; 32 if left out.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Another seed, other pieces: see merge.")] = None,
     sensor: Annotated[str | None, typer.Option(help="hemisphere; retro, mirror or normal (windows); points.")] = None,
@@ -88,23 +89,28 @@ def measure(
         Path | None, typer.Option("--out", "-o", help="NPZ; named after what is measured if left out.")
     ] = None,
     tensor: Annotated[Path | None, typer.Option(metavar="BSDF", help="RGL's tensor file, to write as well.")] = None,
-    before: Annotated[Path | None, typer.Option("--continue", metavar="NPZ", help="Add paths to this file.")] = None,
+    before: Annotated[
+        Path | None,
+        typer.Option("--continue", metavar="NPZ", help="Go on with this file, up to its paths, or --paths."),
+    ] = None,
+    checkpoint: Annotated[float, typer.Option(min=0, metavar="SECONDS", help="How often to save what there is.")] = 60,
+    force: output.Force = False,
 ) -> None:
     """Measure the BSDF of a microgeometry with the virtual goniophotometer: f |cos θo| with standard errors.
 
     `asperity measure micrograin --set tau_0=0.5 --theta 30,60 --orders 1` measures the grains that a model stands for.
-    Ctrl-C stops, and keeps what was measured.
+    Ctrl-C stops, and keeps what was measured; so does the end of a scheduler's time. The same command with --continue
+    FILE takes it up, to the same bits.
     """
     if sum(way is not None for way in (target, preset, material)) != 1:
         raise ParameterError(f"give one of: the name of a model, {', '.join(SHAPES)}, --preset, --material.")
     name = preset or (file or material or Path(target or "")).stem
-    out = writable(out or before or Path(f"{name}.npz"), FORMATS)
+    options: dict[str, Any] = {"force": force, "inputs": (file, material, bsdf, *(settings or []))}
+    out = ctx.with_resource(to_write(out, before, f"{name}.npz", **options))
     if tensor is not None:
-        tensor = writable(tensor, TENSORS, "--tensor")
+        [tensor] = ctx.with_resource(output.files(tensor, Path(f"{name}.bsdf"), TENSORS, option="--tensor", **options))
     with console.status("loading"):
         variants.choose(variant)
-        from asperity import goniophotometer
-
         shape = {"bsdf": bsdf, "periodic": periodic, "spacing": spacing, "scale": scale}
         about: dict[str, Any] = {}
         if target in SHAPES:
@@ -120,41 +126,73 @@ def measure(
         from asperity.goniophotometer import tensor_file
 
         tensor_file.grid(chosen, incident)  # complains now, not after the tracing
-    given = {"tiles": tiles, "seed": seed, "wavelengths": wavelengths}
+    effort = {"paths": paths, "tiles": tiles, "seed": seed, "wavelengths": wavelengths, "before": earlier}
+    start, interrupted = time.perf_counter(), ctx.with_resource(passes.interruptible())
+    measured = traced(
+        geometry,
+        incident,
+        sensor=chosen,
+        orders=orders,
+        apart=apart,
+        about=about,
+        stop=lambda: bool(interrupted),
+        checkpoint=lambda part: save_part(part, out),
+        interval=checkpoint,
+        **{option: value for option, value in effort.items() if value is not None},
+    )
+    seconds = time.perf_counter() - start
+    out = save(measured, out)
+    report(measured)
+    rate = (measured.total_paths - (earlier.total_paths if earlier else 0)) / seconds
+    early = "" if measured.finished else "stopped early: "
+    typer.echo(f"{early}{out}: {measured.total_paths:.3g} paths, {seconds:.1f} s, {rate:.2g} paths/s")
+    if early:
+        typer.echo(f"The same command with --continue {out} goes on.")
+    elif earlier and measured.total_paths == earlier.total_paths:
+        typer.echo("It had them already: ask for more by --paths.")
+    if tensor is not None:
+        tensor_file.write(measured, tensor)
+        typer.echo(tensor)
+    typer.echo(f"Try next: asperity plot {out}")
+
+
+@contextmanager
+def to_write(out: Path | None, before: Path | None, default: str, **options: Any) -> Iterator[Path]:
+    """The file to write; it may be the one to go on with."""
+    if before is not None and (
+        out is None or before.resolve() in (out.resolve(), Path(f"{out.resolve()}{FORMATS[0]}"))
+    ):
+        out, options = before, {"force": True, "option": "--continue"}
+    elif before is not None:
+        options["inputs"] = (*options["inputs"], before)
+    with output.files(out, Path(default), FORMATS, **options) as [path]:
+        yield path
+
+
+def traced(geometry: Microgeometry, incident: list[tuple[float, float]], **options: Any) -> Measurement:
+    """Measure, and say how far it is."""
+    from asperity import goniophotometer
+
     start = time.perf_counter()
-    with console.progress("million paths") as progress, passes.interruptible() as interrupted:
-        task = progress.add_task("compiling", total=paths * len(incident) / 1e6)
+    with console.progress("million paths") as progress, warnings.catch_warnings(record=True) as warned:
+        task = progress.add_task("compiling", total=0)
 
         def show(done: int, total: int) -> None:
             rate = f"{done / (time.perf_counter() - start):.2g} paths/s"
             progress.update(task, completed=round(done / 1e6, 1), total=round(total / 1e6, 1), description=rate)
 
-        with warnings.catch_warnings(record=True) as warned:
-            measured = goniophotometer.measure(
-                geometry,
-                incident,
-                sensor=chosen,
-                orders=orders,
-                apart=apart,
-                paths=paths,
-                before=earlier,
-                about=about,
-                progress=show,
-                stop=lambda: bool(interrupted),
-                **{option: value for option, value in given.items() if value is not None},
-            )
-    seconds = time.perf_counter() - start
+        measured = goniophotometer.measure(geometry, incident, progress=show, **options)
     for warning in warned:
         typer.echo(f"warning: {warning.message}", err=True)
-    out = save(measured, out)
-    report(measured)
-    rate = (measured.total_paths - (earlier.total_paths if earlier else 0)) / seconds
-    early = "stopped early: " if interrupted else ""
-    typer.echo(f"{early}{out}: {measured.total_paths:.3g} paths, {seconds:.1f} s, {rate:.2g} paths/s")
-    if tensor is not None:
-        tensor_file.write(measured, tensor)
-        typer.echo(tensor)
-    typer.echo(f"Try next: asperity plot {out}")
+    return measured
+
+
+def save_part(measured: Measurement, out: Path) -> None:
+    """Write what there is so far; if that fails, the next time may be luckier."""
+    try:
+        measured.save(out)
+    except OSError as error:
+        console.note(f"warning: no checkpoint: cannot write {out}: {error.strerror}.")
 
 
 def save(measured: Measurement, out: Path) -> Path:

@@ -7,17 +7,18 @@ from typing import Annotated
 
 import typer
 
-from . import console
+from . import console, output
 from .measure import FORMATS, report
-from .output import writable
 
 
 def merge(
+    ctx: typer.Context,
     files: Annotated[list[Path], typer.Argument(metavar="NPZ...", help="Measurements of the same, with other seeds.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="NPZ.")] = Path("merged.npz"),
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="NPZ; merged.npz if left out.")] = None,
+    force: output.Force = False,
 ) -> None:
     """Merge measurements of the same microgeometry with different seeds into one, exactly."""
-    out = writable(out, FORMATS)
+    [out] = ctx.with_resource(output.files(out, Path("merged.npz"), FORMATS, force=force, inputs=files))
     with console.status("loading"):
         from asperity import goniophotometer
 

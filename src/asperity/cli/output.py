@@ -1,49 +1,127 @@
-"""The files that ``asperity render`` writes: whole, or not at all."""
+"""The files that commands write: whole, or not at all, and never over something of the user's that was not to go."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from asperity.errors import ParameterError
-from asperity.files import atomically
+from asperity.files import TakenError, atomically, locked
 
 if TYPE_CHECKING:
     import numpy as np
 
+Force = Annotated[
+    bool,
+    typer.Option("--force", help="Overwrite. Without it, what -o names must be new, and default names get numbers."),
+]
+
 NAME = Path("asperity")
 FORMATS = (".png", ".exr")
+DESCRIPTIONS = (".json", ".xml")
+"""Inputs that may name further ones: textures, say."""
 
 
-def targets(out: Path) -> list[Path]:
-    """The files to write, one for each format if ``out`` has no ending; raises if that cannot work."""
-    if out.is_dir():
-        out = out / NAME
-    if out.suffix and out.suffix.lower() not in FORMATS:
-        raise ParameterError(
-            f"-o {out}: the ending is {out.suffix!r}. Allowed: {', '.join(FORMATS)}, or none for both."
-        )
-    check_folder(out, "-o")
-    return [out] if out.suffix else [out.with_suffix(suffix) for suffix in FORMATS]
+@contextmanager
+def files(
+    out: Path | None,
+    default: Path,
+    formats: Sequence[str],
+    *,
+    force: bool = False,
+    inputs: Iterable[Path | str | None] = (),
+    option: str = "-o",
+) -> Iterator[list[Path]]:
+    """The files to write: ``out``, or ``default`` in that folder, or here; no other command writes them meanwhile.
+
+    Without an ending, ``out`` gets that of ``default``, or all, if that has none. Nothing is overwritten unasked: a
+    name that the user gave is refused if it is taken, unless by ``force``; a default one gets a number. Inputs are
+    never overwritten: paths, what the scenes among them name, and what options (words) name.
+    """
+    named = out is not None and not out.is_dir()
+    path = default if out is None else out if named else out / default.name
+    if path.suffix and path.suffix.lower() not in formats:
+        raise ParameterError(f"{option} {path}: the ending is {path.suffix!r}. Allowed: {', '.join(formats)}.")
+    check_folder(path, option)
+    ending = path.suffix or default.suffix
+    endings = [ending] if ending else formats
+    candidates = ([path.with_name(f"{path.stem}{n}{ending}") for ending in endings] for n in numbers())
+    with first_free(candidates, named, lambda file: complaint(file, force, list(inputs)), option) as found:
+        yield found
 
 
-def writable(out: Path, formats: tuple[str, ...], option: str = "-o") -> Path:
-    """The file to write, with the first of the endings if it has none; raises if that cannot work."""
-    if not out.suffix and out.name:
-        out = out.with_suffix(formats[0])
-    if out.is_dir():
-        raise ParameterError(f"{option} {out}: it is a folder.")
-    if out.suffix.lower() not in formats:
-        raise ParameterError(f"{option} {out}: the ending is {out.suffix!r}. Allowed: {', '.join(formats)}.")
-    check_folder(out, option)
-    return out
+@contextmanager
+def folder(out: Path | None, default: Path, *, force: bool = False, option: str = "-o") -> Iterator[Path]:
+    """The folder to write into, under the same rules: it is taken if there is something in it."""
+    path = out or default
+    check_folder(path, option)
+
+    def taken(path: Path) -> str | None:
+        full = any(path.iterdir()) if path.is_dir() else path.exists()
+        return "it exists, and is not empty. Take another, or --force." if full and not force else None
+
+    candidates = ([path.with_name(f"{path.name}{n}") if n else path] for n in numbers())
+    with first_free(candidates, out is not None, taken, option) as found:
+        yield found[0]
+
+
+@contextmanager
+def first_free(
+    candidates: Iterable[list[Path]], named: bool, complaint: Callable[[Path], str | None], option: str
+) -> Iterator[list[Path]]:
+    """The first candidates that nobody complains of, locked; if they were named, the first ones must do."""
+    for paths in candidates:
+        with ExitStack() as stack:
+            try:
+                for path in paths:
+                    stack.enter_context(locked(path))
+                    if (reason := complaint(path)) is not None:
+                        raise TakenError(f"{option} {path}: {reason}")
+            except TakenError:
+                if named:
+                    raise
+                continue
+            locks = stack.pop_all()
+        with locks:
+            yield paths
+            return
+
+
+def numbers() -> Iterator[str]:
+    """What tells names apart: nothing, -2, -3 and so on."""
+    return (f"-{n}" if n > 1 else "" for n in count(1))
+
+
+def complaint(file: Path, force: bool, inputs: list[Path | str | None]) -> str | None:
+    """Why a file must not be written; None if it may."""
+    if not file.exists():
+        return None
+    if any(is_input(file, one) for one in inputs if one is not None):
+        return "it is an input of this command."
+    return None if force and file.is_file() else "it exists. Take another name, or --force to overwrite it."
+
+
+def is_input(file: Path, one: Path | str) -> bool:
+    """Whether a file is an input, or is named in one, or in an option."""
+    if isinstance(one, Path) and one.exists():
+        if one.samefile(file):
+            return True
+        one = one.read_text(errors="replace") if one.suffix.lower() in DESCRIPTIONS else ""
+    return re.search(rf"(^|[=/\\\"']){re.escape(file.name)}($|[\"'])", str(one)) is not None
 
 
 def check_folder(out: Path, option: str) -> None:
     """Raise ParameterError if nothing can be written beside ``out``."""
+    parent = out.resolve().parent
     try:
-        with TemporaryFile(dir=out.parent):
+        with TemporaryFile(dir=parent):
             pass
     except OSError as error:
         raise ParameterError(

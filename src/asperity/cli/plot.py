@@ -9,19 +9,20 @@ import typer
 
 from asperity.files import atomically
 
-from . import console, variants
-from .output import writable
+from . import console, output, variants
 
 FORMATS = (".png", ".pdf", ".svg")
 
 
 def plot(
+    ctx: typer.Context,
     file: Annotated[Path, typer.Argument(metavar="NPZ", help="What `asperity measure` wrote.")],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="PNG, PDF or SVG; FILE.png if left out.")] = None,
     model: Annotated[bool, typer.Option(help="Draw the model's own values as well, if it is a model's.")] = True,
+    force: output.Force = False,
 ) -> None:
     """Plot a measurement: maps, their errors, slices through the plane of incidence, and the albedo."""
-    out = writable(out or file.with_suffix(".png"), FORMATS)
+    [out] = ctx.with_resource(output.files(out, file.parent / f"{file.stem or output.NAME}.png", FORMATS, force=force))
     with console.status("drawing"):
         from asperity.goniophotometer import Measurement, plots
 

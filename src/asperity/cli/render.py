@@ -40,6 +40,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def render(
+    ctx: typer.Context,
     scene: Annotated[Path | None, typer.Argument(metavar="SCENE", help="A whole scene, XML or JSON.")] = None,
     preset: materials.PresetName = None,
     material: materials.MaterialFile = None,
@@ -53,11 +54,15 @@ def render(
     spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Another seed, another noise.")] = 0,
     variant: variants.Variant = None,
-    out: Annotated[Path, typer.Option("--out", "-o", help="PNG or EXR; both, if it has no ending.")] = output.NAME,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="PNG or EXR; both, if it has no ending. Default: a new asperity.")
+    ] = None,
+    force: output.Force = False,
 ) -> None:
     """Render a material on the preview scene, or a scene file, to a PNG and an EXR."""
     start = time.perf_counter()
-    files = output.targets(out)
+    inputs = (scene, material, env and Path(env), object_ and Path(object_), *(settings or []))
+    files = ctx.with_resource(output.files(out, output.NAME, output.FORMATS, force=force, inputs=inputs))
     values = (preset, material, settings, object_, env, compare)
     given = {name: value for name, value in zip(PREVIEW, values) if value not in (None, [])}
     if scene and given:
@@ -68,7 +73,7 @@ def render(
         spp = spp or (scenes[0].sensors()[0].sampler().sample_count() if scene else SPP)
     loaded = time.perf_counter()
 
-    images, done = passes.average(scenes, spp, seed)
+    images, done = passes.average(scenes, spp, seed, ctx.with_resource(passes.interruptible()))
     image = beside(*images) if compare else images[0]
     names = scene_files.channel_names(scenes[0], image.shape[-1])
     for file in files:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import time
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -19,7 +22,11 @@ from .tracer import EXTRA, Settings, trace
 
 BATCH = 2**20
 """Paths in one kernel launch, at most: they fill any processor, and little memory."""
-PATHS, TILES = 2**22, 32
+PATHS, TILES = 4_000_000, 32
+INTERVAL = 60.0
+"""Seconds from one checkpoint to the next."""
+COPIES = 5
+"""Of the counts, at the same time: themselves, a checkpoint, and three while it is written."""
 ENDLESS = 10_000
 """Scatterings that stand for all of them; what is left is counted as cut."""
 
@@ -31,7 +38,7 @@ def measure(
     sensor: Sensor | None = None,
     orders: int | None = None,
     apart: int = 1,
-    paths: float = PATHS,
+    paths: float | None = None,
     tiles: int = TILES,
     seed: int = 0,
     wavelengths: Sequence[float] | None = None,
@@ -39,6 +46,8 @@ def measure(
     about: dict[str, Any] | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
     stop: Callable[[], bool] = lambda: False,
+    checkpoint: Callable[[Measurement], None] | None = None,
+    interval: float = INTERVAL,
 ) -> Measurement:
     """Measure the BSDF of a microgeometry.
 
@@ -48,34 +57,41 @@ def measure(
     sensor : a `Hemisphere` (the default), a `Window`, or `Points` for next-event estimation
     orders : the highest order of scattering that is followed; all of them if None
     apart : how many orders are counted apart; the last one takes all that follow
-    paths : per direction, shared among the tiles
+    paths : per direction, shared among the tiles; those of ``before`` included; 4 million if None
     tiles : how many tiles are drawn; the standard error comes from their differences, so at least 2
     seed : the same seed gives the same result, bit for bit, on any machine of the same kind
     wavelengths : in nm, as many as the spectral variant has channels
-    before : a measurement of the same thing: its tiles get more paths. (Other seeds, more tiles: see `merge`.)
+    before : a measurement of the same thing, to go on with; to its own goal if ``paths`` is None. If it was stopped,
+        the result is that of one that was not, bit for bit. (Other seeds, more tiles: see `merge`.)
     about : what else to note in the result
     progress(done, total) : called after each batch of paths
     stop() : asked after each batch; True ends the measurement with what there is
+    checkpoint(measurement) : called with what there is, to save it, say, every ``interval`` seconds, and not so often
+        if it takes more than a tenth of that
+
+    Raises ParameterError for what cannot be measured, or not with the memory that there is.
     """
     sensor = sensor or Hemisphere()
     check_angles(incident)
-    check_effort(incident, paths, tiles, seed)
+    check_effort(incident, PATHS if paths is None else paths, tiles, seed)
     for name, order in (("orders", orders), ("apart", apart)):
         if order is not None:
             _check_whole(name, order, 1)
     settings = Settings(orders or ENDLESS, min(apart, orders or apart), _wavelengths(wavelengths))
     result = _empty(geometry, incident, sensor, settings, tiles, seed, about or {})
     if before is not None:
-        result = _continued(before, result)
+        check_alike(before, result, "continuing")
+        result = before.copy()
     # Each path of a batch aims at one of the points: every point must get as many.
     share = sensor.cells if isinstance(sensor, Points) else 1
-    quota = -(-int(paths) // (len(result.labels) * share)) * share
     batch = max(BATCH // share, 1) * share
-    goal = result.paths + quota
-    done, total = 0, quota * result.paths.size
+    if before is None or paths is not None:
+        result = replace(result, goal=_goal(result, PATHS if paths is None else paths, share))
+    missing = np.maximum(result.goal[:, None] - result.paths, 0)
+    done, total, due = 0, int(missing.sum()), time.monotonic() + interval
     while done < total:
         for row, (tile_seed, number) in enumerate(result.labels):
-            if np.all(result.paths[row] >= goal[row]):
+            if np.all(result.paths[row] >= result.goal[row]):
                 continue
             tile = geometry.tile(np.random.default_rng([tile_seed, number]))
             if isinstance(sensor, Points):
@@ -83,7 +99,8 @@ def measure(
             if done == 0:
                 _warn_of_repetition(tile, result.incident)
             for k, wi in enumerate(result.wi):
-                lanes = min(batch, int(goal[row, k] - result.paths[row, k]))
+                # Batches begin at the same paths, and have the same numbers, wherever the measurement was stopped.
+                lanes = min(batch, int(result.goal[row] - result.paths[row, k]))
                 if lanes <= 0:
                     continue
                 stream = np.random.SeedSequence([int(tile_seed), int(number), k, int(result.paths[row, k])])
@@ -93,7 +110,26 @@ def measure(
                 progress(done, total)
                 if stop():
                     return result
+                if checkpoint is not None and time.monotonic() >= due:
+                    due = _saved(checkpoint, result) + interval
     return result
+
+
+def _saved(checkpoint: Callable[[Measurement], None], result: Measurement) -> float:
+    """Hand over what there is; return the time from which to count to the next."""
+    start = time.monotonic()
+    checkpoint(result.copy())
+    end = time.monotonic()
+    return end + 9 * (end - start)
+
+
+def _goal(start: Measurement, paths: float, share: int) -> np.ndarray:
+    """How many paths each tile is to have for each direction: as many as all others, and a multiple of ``share``."""
+    tiles, most = len(start.labels), int(start.paths.sum(axis=0).max())
+    quota = -(-int(paths) // (tiles * share)) * share
+    if quota * tiles < most:
+        raise ParameterError(f"paths = {paths:g}: there are {most:g} per direction already; ask for more than that.")
+    return np.full(tiles, quota)
 
 
 def _empty(geometry, incident, sensor, settings, tiles, seed, about) -> Measurement:
@@ -101,6 +137,7 @@ def _empty(geometry, incident, sensor, settings, tiles, seed, about) -> Measurem
     channels = dr.size_v(mi.UnpolarizedSpectrum)
     names = [f"{w:g} nm" for w in settings.wavelengths] or list("RGB" if channels == 3 else "Y")
     shape = (tiles, len(incident), settings.orders, sensor.cells + EXTRA, channels)
+    _check_memory(*shape)
     return Measurement(
         about
         | {
@@ -114,13 +151,23 @@ def _empty(geometry, incident, sensor, settings, tiles, seed, about) -> Measurem
         np.stack([np.full(tiles, seed), np.arange(tiles)], axis=1),
         np.zeros(shape[:2], dtype=np.int64),
         np.zeros(shape, dtype=np.uint64),
+        np.zeros(tiles, dtype=np.int64),
     )
 
 
-def _continued(before: Measurement, fresh: Measurement) -> Measurement:
-    """A copy of ``before``, to add to; it must be about the same as ``fresh``."""
-    check_alike(before, fresh, "continuing")
-    return Measurement(before.about, before.incident, before.labels, before.paths.copy(), before.energy.copy())
+def _check_memory(tiles: int, directions: int, orders: int, columns: int, channels: int) -> None:
+    """Raise ParameterError if the machine has less memory than so many counts, and what is made of them, need."""
+    need = COPIES * 8 * tiles * directions * orders * columns * channels
+    try:
+        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # Windows does not tell
+        return
+    if need > there:
+        raise ParameterError(
+            f"tiles = {tiles}: with {directions} directions of incidence, {orders} orders apart, {columns - EXTRA} "
+            f"cells and {channels} channels, they need {need / 2**30:.3g} GiB of memory, and this machine has "
+            f"{there / 2**30:.3g}. Measure fewer of one of these."
+        )
 
 
 def check_effort(incident: Sequence[Any], paths: float, tiles: int, seed: int) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,9 +14,11 @@ import numpy as np
 from ..errors import ParameterError, UnreadableFileError, readable
 from ..files import atomically
 from . import sensors
-from .tracer import BELOW, CUT, ELSEWHERE, UNIT
+from .tracer import BELOW, CUT, ELSEWHERE, EXTRA, UNIT
 
 FORMATS = (".npz",)
+ARRAYS = {"incident": "f", "labels": "iu", "paths": "iu", "energy": "u", "goal": "iu"}
+"""What a file must hold to go on from it, and the kinds of numbers (NumPy's letters)."""
 
 
 class Estimate(NamedTuple):
@@ -46,7 +47,7 @@ class Measurement:
     """Light counted by tile, direction of incidence, order of scattering, cell and channel.
 
     ``about`` says of what and how: the microgeometry, the sensor, the limits. Two measurements that are about the same
-    may be merged.
+    may be merged. One that was stopped has fewer ``paths`` than its ``goal``; `measure` takes it up there.
     """
 
     about: dict[str, Any]
@@ -54,6 +55,7 @@ class Measurement:
     labels: np.ndarray  # (tiles, 2): seed and number
     paths: np.ndarray  # (tiles, directions)
     energy: np.ndarray  # (tiles, directions, orders, cells + EXTRA, channels), in units
+    goal: np.ndarray  # (tiles,): how many paths each direction is to get
 
     @cached_property
     def sensor(self) -> sensors.Sensor:
@@ -80,6 +82,15 @@ class Measurement:
     def total_paths(self) -> int:
         """Over all directions."""
         return int(self.paths.sum())
+
+    @property
+    def finished(self) -> bool:
+        """Whether all paths were traced that were asked for."""
+        return bool(np.all(self.paths >= self.goal[:, None]))
+
+    def copy(self) -> Measurement:
+        """One to add to."""
+        return replace(self, paths=self.paths.copy(), energy=self.energy.copy())
 
     @cached_property
     def values(self) -> Estimate:
@@ -135,10 +146,7 @@ class Measurement:
             np.savez_compressed(
                 part,
                 about=json.dumps(self.about),
-                incident=self.incident,
-                labels=self.labels,
-                paths=self.paths,
-                energy=self.energy,
+                **{name: getattr(self, name) for name in ARRAYS},
                 wi=self.wi,
                 wo=np.stack([self.sensor.directions(wi)[:, 0] for wi in self.wi]),
                 values=self.values.value,
@@ -154,10 +162,35 @@ class Measurement:
         path = readable("measurement", path, FORMATS)
         try:
             with np.load(path, allow_pickle=False) as file:
-                raw = {name: file[name] for name in ("incident", "labels", "paths", "energy")}
-                return Measurement(json.loads(str(file["about"])), **raw)
-        except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
+                found = Measurement(json.loads(str(file["about"])), **{name: file[name] for name in ARRAYS})
+            _check_whole(found)
+        except Exception as error:  # of zipfile, zlib, NumPy and json: damage shows in any way
             raise UnreadableFileError("measurement", path, FORMATS, f"not written by asperity ({error})") from error
+        return found
+
+
+def _check_whole(measured: Measurement) -> None:
+    """Raise if a measurement is at odds with itself."""
+    about, energy = measured.about, measured.energy
+    tiles, directions = len(measured.labels), len(measured.incident)
+    shapes = {
+        "incident": (directions, 2),
+        "labels": (tiles, 2),
+        "paths": (tiles, directions),
+        "energy": (tiles, directions, about["orders"], measured.sensor.cells + EXTRA, len(about["channels"])),
+        "goal": (tiles,),
+    }
+    for name, kinds in ARRAYS.items():
+        array = getattr(measured, name)
+        if array.dtype.kind not in kinds or array.shape != shapes[name]:
+            raise ParameterError(f"{name} is of type {array.dtype} and shape {array.shape}, not {shapes[name]}")
+    if min(energy.shape) < 1 or min(measured.labels.min(), measured.paths.min(), measured.goal.min()) < 0:
+        raise ParameterError("it is empty, or counts below zero")
+    sensors.check_angles(measured.incident)
+    if energy[measured.paths == 0].any():
+        raise ParameterError("light where no path was")
+    if not (isinstance(about["geometry"], dict) and isinstance(about["limit"], int)):
+        raise ParameterError("it does not say of what it is")
 
 
 def check_alike(one: Measurement, other: Measurement, doing: str) -> None:
@@ -176,12 +209,12 @@ def merge(measurements: Sequence[Measurement]) -> Measurement:
     first, *others = measurements
     for other in others:
         check_alike(first, other, "merging")
-    labels, paths, energy = (
-        np.concatenate([getattr(one, name) for one in measurements]) for name in ("labels", "paths", "energy")
+    labels, paths, energy, goal = (
+        np.concatenate([getattr(one, name) for one in measurements]) for name in ("labels", "paths", "energy", "goal")
     )
     unique, counts = np.unique(labels, axis=0, return_counts=True)
     if counts.max() > 1:
         seed = unique[np.argmax(counts)][0]
         raise ParameterError(f"merging: seed {seed} is there twice, and its paths are the same. Use other seeds.")
     order = np.lexsort(labels.T[::-1])
-    return Measurement(first.about, first.incident, labels[order], paths[order], energy[order])
+    return Measurement(first.about, first.incident, labels[order], paths[order], energy[order], goal[order])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import drjit as dr
@@ -49,7 +49,7 @@ def sections(effort: Effort) -> Iterator[Section]:
     yield explicit(effort)
     yield slab(effort)
     yield ball(effort)
-    yield sheet()
+    yield sheet(effort)
 
 
 def phase_function(effort: Effort) -> Section:
@@ -81,7 +81,13 @@ def walked(albedo: float, effort: Effort) -> Estimate:
     # Without end for albedo 1, and longer the nearer it is: those get fewer paths.
     paths = effort.paths * (1 if albedo < 0.9 else 0.25)
     measured = measure(
-        RandomWalk(albedo), INCIDENT, sensor=Points(OUTGOING), paths=paths, tiles=effort.tiles, seed=effort.seed
+        RandomWalk(albedo),
+        INCIDENT,
+        sensor=Points(OUTGOING),
+        paths=paths,
+        tiles=effort.tiles,
+        seed=effort.seed,
+        progress=effort.tick,
     )
     return Estimate(*(part[..., 0] for part in measured.summed))
 
@@ -135,7 +141,9 @@ def energy(effort: Effort) -> Section:
     rows, findings = [], []
     for albedo in ALBEDOS:
         paths = effort.paths * (1 if albedo < 0.9 else 0.25)
-        measured = measure(RandomWalk(albedo), incident, paths=paths, tiles=effort.tiles, seed=effort.seed)
+        measured = measure(
+            RandomWalk(albedo), incident, paths=paths, tiles=effort.tiles, seed=effort.seed, progress=effort.tick
+        )
         truth = Estimate(*(part[:, 0] for part in measured.total_albedo))
         found = {v: evaluate.albedo(evaluate.load(spheres(albedo, variant=v)), measured.wi)[0] for v in VARIANTS}
         findings.append(
@@ -170,7 +178,13 @@ def explicit(effort: Effort) -> Section:
     for fraction in (0.2, 0.07, 0.02):
         geometry = ExplicitSpheres(albedo, fraction, width=min(6.0, 240 * fraction))
         measured = measure(
-            geometry, incident, sensor=sensor, paths=effort.paths / 2, tiles=max(effort.tiles // 2, 4), seed=effort.seed
+            geometry,
+            incident,
+            sensor=sensor,
+            paths=effort.paths / 2,
+            tiles=max(effort.tiles // 2, 4),
+            seed=effort.seed,
+            progress=effort.tick,
         )
         ratio = measured.summed.value[0, :, 0] / model
         error = measured.summed.error[0, :, 0] / model
@@ -226,10 +240,11 @@ def slab(effort: Effort) -> Section:
                 "sampler": {"type": "independent"},
             },
         }
-        loaded = mi.load_dict(scene, parallel=False)
-        runs = [
-            float(np.array(mi.render(loaded, spp=samples // 16, seed=16 * effort.seed + k))[0, 0, 0]) for k in range(16)
-        ]
+        loaded, runs = mi.load_dict(scene, parallel=False), []
+        for k in range(16):
+            effort.tick()
+            image = np.array(mi.render(loaded, spp=samples // 16, seed=16 * effort.seed + k))
+            runs.append(float(image[0, 0, 0]))
         truth = Estimate(np.array([np.mean(runs)]), np.array([np.std(runs, ddof=1) / 4]))
         model = evaluate.cell_means(bsdf, wi, wo[None, None])[0] * wi[2] / wo[2]  # radiance for unit irradiance
         name = f"({theta}°, {phi}°) to ({out}°, {azimuth}°)"
@@ -265,7 +280,7 @@ def ball(effort: Effort, radius: float = 150.0, fraction: float = 0.07, size: in
     )
     rows = []
     for row, angle in zip(grid, (0, 90)):
-        images = {name: lit(shape, angle, 1.1 * radius, size, spp) for name, shape in shapes.items()}
+        images = {name: lit(shape, angle, 1.1 * radius, size, spp, effort.tick) for name, shape in shapes.items()}
         for axes, (name, image) in zip(row, images.items()):
             axes.imshow(np.clip(image, 0, 1) ** (1 / 2.2), cmap="gray", vmin=0, vmax=1)
             axes.set_title(name, fontsize=8)
@@ -281,8 +296,11 @@ def ball(effort: Effort, radius: float = 150.0, fraction: float = 0.07, size: in
     )
 
 
-def lit(shape: dict[str, Any], angle: float, scale: float, size: int, spp: int) -> np.ndarray:
+def lit(
+    shape: dict[str, Any], angle: float, scale: float, size: int, spp: int, tick: Callable[..., None]
+) -> np.ndarray:
     """A picture (size, size) of a shape about the origin, light from the side by ``angle`` in degrees."""
+    tick()
     light = [-np.sin(np.radians(angle)), 0.0, -np.cos(np.radians(angle))]
     camera = mi.ScalarTransform4f().look_at([0, 0, 5 * scale], [0, 0, 0], [0, 1, 0]).scale([scale, scale, 1])
     scene = {
@@ -299,12 +317,12 @@ def lit(shape: dict[str, Any], angle: float, scale: float, size: int, spp: int) 
     return np.array(mi.render(mi.load_dict(scene, parallel=False), spp=spp))[..., 0]
 
 
-def sheet(size: int = 128, spp: int = 64) -> Section:
+def sheet(effort: Effort, size: int = 128, spp: int = 64) -> Section:
     """Fig. 9 and 11: spheres under front, side and back light."""
     figure, grid = figures.grid(3, len(SHEET), "", "", "front, side and back light; reflectance 0.5")
     for row, angle in zip(grid, (0, 90, 150)):
         for axes, (name, material) in zip(row, SHEET.items()):
-            image = lit({"type": "sphere", "bsdf": material | {"reflectance": 0.5}}, angle, 1.1, size, spp)
+            image = lit({"type": "sphere", "bsdf": material | {"reflectance": 0.5}}, angle, 1.1, size, spp, effort.tick)
             axes.imshow(np.clip(image, 0, 1) ** (1 / 2.2), cmap="gray", vmin=0, vmax=1)
             axes.set_title(name, fontsize=8)
             axes.set_axis_off()

@@ -53,6 +53,7 @@ def shoot(description: dict[str, Any], angles: Any, effort: Effort, **options: A
         paths=effort.paths,
         tiles=effort.tiles,
         seed=effort.seed,
+        progress=effort.tick,
         **options,
     )
 
@@ -113,6 +114,7 @@ def masking_by_azimuth(effort: Effort) -> Section:
         points=effort.paths,
         tiles=effort.tiles,
         seed=effort.seed,
+        progress=effort.tick,
     )
     ring = int((1 - np.cos(np.radians(50))) * rows)
     low, high = 1 - (ring + 1) / rows, 1 - ring / rows
@@ -166,6 +168,7 @@ def distant_masking(effort: Effort) -> Section:
             points=effort.paths / 4,
             tiles=effort.tiles,
             seed=effort.seed,
+            progress=effort.tick,
         )
         grain = list(measured.parts).index("grains")
         truth = Estimate(*(part[:, grain] for part in measured.distant))
@@ -193,6 +196,7 @@ def pores(effort: Effort) -> Section:
             points=effort.paths / 4,
             tiles=effort.tiles,
             seed=effort.seed,
+            progress=effort.tick,
         )
         truth = measured.visible("base")
         i, o = (to_sphere(evaluate.vectors(directions(ws)), beta_x, beta_y) for ws in zip(*pairs))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -48,11 +48,15 @@ class Section:
 
 
 class Effort(NamedTuple):
-    """How long to measure: paths per direction, and tiles, which give the standard error."""
+    """How long to measure: paths per direction, and tiles, which give the standard error.
+
+    ``tick`` is called every second or so; what it raises ends the section.
+    """
 
     paths: float
     tiles: int
     seed: int = 0
+    tick: Callable[..., None] = lambda *_: None
 
 
 def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float) -> Finding:
@@ -86,19 +90,20 @@ def passed(sections: Iterable[Section]) -> bool:
     return all(finding.passed is not False for section in sections for finding in section.findings)
 
 
-def write(title: str, preface: str, sections: Sequence[Section], folder: Path) -> Path:
-    """Write ``report.md`` and its pictures into ``folder``; return the report's path."""
+def write(title: str, preface: str, sections: Sequence[Section], folder: Path, drawn: int = 0) -> Path:
+    """Write ``report.md`` and its pictures into ``folder``, but for the first sections; return the report's path."""
     folder.mkdir(parents=True, exist_ok=True)
     lines = [f"# {title}", preface]
-    for section in sections:
+    for k, section in enumerate(sections):
         lines += [f"## {section.title}", section.text]
         if section.findings:
             rows = [(f.claim, f.measured, f.bound, _verdict(f.passed)) for f in section.findings]
             lines.append(_markdown(Table(("claim", "measured", "bound", ""), rows)))
         lines += [_markdown(table) for table in section.tables]
         for name, figure in section.figures.items():
-            with atomically(folder / f"{name}.png") as part:
-                figure.savefig(part, format="png")
+            if k >= drawn:
+                with atomically(folder / f"{name}.png") as part:
+                    figure.savefig(part, format="png")
             lines.append(f"![{name}]({name}.png)")
     report = folder / "report.md"
     with atomically(report) as part:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import drjit as dr
@@ -42,7 +42,7 @@ TABLE_2 = {
 
 def sections(effort: Effort) -> Iterator[Section]:
     """The report, section by section, as it is measured."""
-    yield kaleidoscope()
+    yield kaleidoscope(tick=effort.tick)
     yield brdf_by_bounce(effort)
     yield nonsymmetric(effort)
     yield bounces()
@@ -101,7 +101,7 @@ def predicted(psi: np.ndarray, left: np.ndarray, right: np.ndarray, most: int) -
     return total
 
 
-def kaleidoscope(step: int = 1) -> Section:
+def kaleidoscope(step: int = 1, tick: Callable[..., None] = lambda *_: None) -> Section:
     """Table 1: shares of light by bounces, for single grooves."""
     rows, findings = [], []
     theta = np.arange(-89, 90, step)
@@ -113,7 +113,8 @@ def kaleidoscope(step: int = 1) -> Section:
     for name, grid in grids.items():
         tilts = np.radians([tilt if isinstance(tilt, tuple) else (tilt, tilt) for tilt in grid])
         errors, exits = [], []
-        for chunk in np.array_split(tilts, max(len(tilts) * len(theta) // 4000, 1)):
+        for chunk in np.array_split(tilts, max(len(tilts) * len(theta) // 1000, 1)):
+            tick()
             psi = np.tile(np.radians(theta), len(chunk))
             left, right = np.repeat(chunk, len(theta), axis=0).T
             most = min(int(np.ceil(np.pi / (np.pi - left - right).min())), 180)
@@ -163,7 +164,9 @@ def grooves(alpha: float, **others: Any) -> dict[str, Any]:
 def shoot(description: dict[str, Any], angles: Any, effort: Effort, **options: Any) -> Measurement:
     """Measure the explicit grooves that the description stands for."""
     geometry = VGroove.microgeometry(description)
-    return measure(geometry, angles, paths=effort.paths, tiles=effort.tiles, seed=effort.seed, **options)
+    return measure(
+        geometry, angles, paths=effort.paths, tiles=effort.tiles, seed=effort.seed, progress=effort.tick, **options
+    )
 
 
 def by_bounce(description: dict[str, Any], measured: Measurement, orders: int) -> np.ndarray:
@@ -308,11 +311,11 @@ def furnace(effort: Effort) -> Section:
             Finding("energy of all bounces", f"{worst:.3%} missing at most", f"{bound:.3%}", bool(worst <= bound)),
         ],
         [Table(("distribution", "grooves", "α", "one bounce, traced", "one bounce", "all"), rows)],
-        {"fig12": furnace_spheres()},
+        {"fig12": furnace_spheres(tick=effort.tick)},
     )
 
 
-def furnace_spheres(size: int = 128, spp: int = 128) -> Any:
+def furnace_spheres(size: int = 128, spp: int = 128, tick: Callable[..., None] = lambda *_: None) -> Any:
     """Spheres in a white furnace, GGX, alpha 0.5: what is seen is what is lost."""
     figure, grid = figures.grid(1, 4, "", "", "white furnace, GGX, α 0.5")
     cases: dict[str, dict[str, Any]] = {
@@ -322,6 +325,7 @@ def furnace_spheres(size: int = 128, spp: int = 128) -> Any:
         "non-symmetric, all": {"symmetric": False},
     }
     for axes, (name, changes) in zip(grid[0], cases.items()):
+        tick()
         scene = {
             "type": "scene",
             "integrator": {"type": "path"},
