@@ -19,20 +19,22 @@ LANES = 2**21
 """Samples of a pass, at most: enough to fill any processor, few enough for its memory."""
 
 
-def average(scenes: list[Any], spp: int, seed: int) -> tuple[list[np.ndarray], int]:
-    """Images (height, width, channels) of the scenes, and how many samples per pixel they got."""
+def average(scenes: list[Any], spp: int, seed: int, sensor: int = 0) -> tuple[list[np.ndarray], int]:
+    """Images (height, width, channels) from a sensor of the scenes, and how many samples per pixel they got."""
     import mitsuba as mi
     import numpy as np
 
-    sensor = scenes[0].sensors()[0]
-    pixels = math.prod(sensor.film().crop_size())
+    film, sampler = scenes[0].sensors()[sensor].film(), scenes[0].sensors()[sensor].sampler()
+    pixels = math.prod(film.crop_size())
     seeds, totals, done = np.random.default_rng(seed), [np.zeros(1)] * len(scenes), 0
     with console.progress("spp") as progress, interruptible() as interrupted:
         task = progress.add_task("compiling", total=spp)
         while done < spp and not interrupted:
             n, pass_seed = pass_size(spp - done, pixels), int(seeds.integers(2**32))
-            images = [np.array(mi.render(scene, spp=n, seed=pass_seed), dtype=np.float64) for scene in scenes]
-            n = sensor.sampler().sample_count()  # some samplers round it up
+            images = [
+                np.array(mi.render(scene, sensor=sensor, spp=n, seed=pass_seed), dtype=np.float64) for scene in scenes
+            ]
+            n = sampler.sample_count()  # some samplers round it up
             totals, done = [total + n * image for total, image in zip(totals, images)], done + n
             progress.update(task, completed=done, description="rendering")
     return [total / done for total in totals], done

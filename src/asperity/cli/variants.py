@@ -9,7 +9,10 @@ import typer
 from asperity import llvm
 from asperity.errors import ParameterError, UnknownNameError
 
-Variant = Annotated[str | None, typer.Option(help="Mitsuba variant; llvm_ad_rgb if LLVM works, else scalar_rgb.")]
+Variant = Annotated[
+    str | None,
+    typer.Option("--variant", "-m", help="Mitsuba variant; llvm_ad_rgb if LLVM works, else scalar_rgb."),
+]
 
 
 def choose(variant: str | None) -> None:
