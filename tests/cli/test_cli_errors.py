@@ -72,6 +72,12 @@ BAD = [
     (("render", "-D", "x=1"), "they are for scene files"),
     (("render", "-s", "1"), "they are for scene files"),
     (("show", "micrograin", "--json"), "micrograin is no preset"),
+    (("measure", "--preset", "worn-gold"), "error: alpha = {'type': 'bitmap'"),
+    (
+        ("measure", "vgroove", "--set", "distribution=phong", "--set", 'exponent={"type": "checkerboard"}'),
+        "exponent = ",
+    ),
+    (("measure", "micrograin", "--set", 'beta={"type": "checkerboard"}'), "error: beta = {"),
     (("check",), "give one of"),
     (("check", "difuse"), "Did you mean 'diffuse'?"),
     (("check", "sphere"), "'sphere' is not a material"),
