@@ -105,6 +105,14 @@ def test_the_cause_of_an_error_of_dr_jit_is_said(asperity, monkeypatch):
     assert asperity("render").stderr == "error: the cause\n"
 
 
+def test_a_machine_that_is_too_small(asperity, monkeypatch):
+    def fail(*_):
+        raise MemoryError
+
+    monkeypatch.setattr("asperity.cli.render.previews", fail)
+    assert asperity("render").stderr == "error: out of memory\n"
+
+
 def test_debug_shows_the_traceback(asperity):
     result = asperity("render", "--preset", "glided", "--debug")
     assert "UnknownNameError" in repr(result.exception)

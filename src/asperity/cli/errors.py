@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 
 from asperity.errors import AsperityError
 
-FAULTS = (AsperityError, RuntimeError, ImportError, OSError)
+FAULTS = (AsperityError, RuntimeError, ImportError, OSError, MemoryError)
 """Of what was asked for, or of the machine. Mitsuba knows only RuntimeError, and ImportError for variants."""
 
 NOISE = {
@@ -56,7 +56,7 @@ class OneLineErrors(TyperGroup):
             cause: BaseException = error
             while "(see above)" in str(cause) and cause.__cause__:  # Dr.Jit, of the error before
                 cause = cause.__cause__
-            typer.echo(f"{typer.style('error:', fg='red')} {one_line(str(cause))}", err=True)
+            typer.echo(f"{typer.style('error:', fg='red')} {one_line(str(cause)) or 'out of memory'}", err=True)
             raise typer.Exit(2) from error
 
 

@@ -77,7 +77,7 @@ def description(path: Path, defines: dict[str, str]) -> dict[str, Any]:
         check_json(content)
     except json.JSONDecodeError as error:
         reason = f"line {error.lineno}, column {error.colno}: {error.msg}"
-    except (ParameterError, UnicodeDecodeError) as error:
+    except (ParameterError, UnicodeDecodeError, RecursionError) as error:
         reason = str(error)
     else:
         if unused := defines.keys() - used:
