@@ -11,7 +11,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from . import llvm
+from . import llvm, threads
 from .microfacet.albedo import directional_albedo
 
 ALBEDO_SAMPLES = 256
@@ -29,6 +29,7 @@ def _switched(_old: str | None, new: str | None) -> None:
     from .models import MODELS, PHASES, TEXTURES  # they import Mitsuba, whose import may be what brought us here
 
     llvm.guard(new)
+    threads.ensure_worker()
     for name, model in MODELS.items():
         mi.register_bsdf(name, _bsdf(model, new))
     for name, model in TEXTURES.items():

@@ -1,3 +1,4 @@
+import os
 import re
 import subprocess
 import sys
@@ -5,9 +6,13 @@ import time
 
 import pytest
 
+from asperity.cli import COMMANDS
 
-def run(*arguments):
-    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=60)
+
+def run(*arguments, encoding="utf-8", **environment):
+    command = [sys.executable, *arguments]
+    environment = {**os.environ, **environment}
+    return subprocess.run(command, capture_output=True, encoding=encoding, timeout=60, env=environment)
 
 
 def test_help_is_fast_and_imports_nothing_heavy():
@@ -32,6 +37,33 @@ def test_works_in_a_fresh_process_without_a_variant(command):
     result = run("-m", "asperity", *command)
     assert result.returncode == 0
     assert "icrograin" in result.stdout
+
+
+@pytest.mark.parametrize("command", [(), *((name,) for name in COMMANDS)], ids=["asperity", *COMMANDS])
+def test_h_is_help(asperity, command):
+    short, long = asperity(*command, "-h"), asperity(*command, "--help")
+    assert short.exit_code == 0 and short.output == long.output and "Usage" in short.output
+
+
+@pytest.mark.parametrize("command", [("list",), ("measure", "--help"), ("render", "--preset", "ψ")], ids=" ".join)
+def test_a_terminal_without_greek(command):
+    """Windows' cp1252; and there the words of a table can still be told from each other."""
+    result = run("-m", "asperity", *command, encoding="cp1252", PYTHONIOENCODING="cp1252")
+    assert "Traceback" not in result.stderr and result.returncode == 2 * ("ψ" in command)
+    assert ("ψ" not in command) or "'psi'" in result.stderr
+
+
+def test_show_json_can_be_rendered_from_anywhere(asperity, tmp_path):
+    from asperity.scenes import presets
+
+    (tmp_path / "elsewhere").mkdir()
+    for name in presets.names():
+        file = tmp_path / "elsewhere" / f"{name}.json"
+        file.write_text(asperity("show", name, "--json").stdout)
+        again, before = presets.read(file)._asdict(), presets.load(name)._asdict()
+        assert repr(again) == repr(before)  # Dr.Jit compares matrices by element
+    result = asperity("render", "--material", f"elsewhere/{presets.DEFAULT}.json", "--size", "8", "--spp", "1")
+    assert result.exit_code == 0, result.output
 
 
 def test_show_tells_of_presets_and_textures(asperity):

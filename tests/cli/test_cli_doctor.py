@@ -20,15 +20,27 @@ def test_an_llvm_that_aborts(asperity, monkeypatch):
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(OLD))
     result = asperity("doctor")
     assert result.exit_code == 1
-    assert "LLVM 15" in result.output and "Unset DRJIT_LIBLLVM_PATH" in result.output
+    assert "LLVM 15" in result.output and f"DRJIT_LIBLLVM_PATH is '{OLD}': unset it" in result.output
 
 
 def test_an_llvm_that_is_not_there(asperity, monkeypatch):
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/none/libLLVM.so")
     result = asperity("doctor")
     assert result.exit_code == 1
-    assert "/none/libLLVM.so (your choice; there is no such file)" in result.output
-    assert "Unset DRJIT_LIBLLVM_PATH" in result.output
+    assert "/none/libLLVM.so (your choice; No such file or directory)" in result.output
+    assert "DRJIT_LIBLLVM_PATH is '/none/libLLVM.so': unset it" in result.output
+
+
+def test_an_llvm_that_is_damaged(tmp_path, monkeypatch):
+    (tmp_path / "libLLVM.so.99").write_text("half a downl")
+    monkeypatch.setattr(llvm, "candidates", lambda: [tmp_path / "libLLVM.so.99", OLD])
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(OLD))
+    assert doctor.libraries()["unusable"] == f"{tmp_path}/libLLVM.so.99: it is no 64-bit library"
+
+
+def test_one_core(monkeypatch):
+    monkeypatch.setattr(doctor.os, "sched_getaffinity", lambda _: {3}, raising=False)
+    assert "waits for ever" in doctor.cores()["cores"]
 
 
 def test_a_child_that_dies(tmp_path, monkeypatch):

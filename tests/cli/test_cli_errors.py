@@ -13,6 +13,10 @@ FILES = {
     "misspelt.xml": '<scene version="3.0.0">\n<bsdf type="micrograin"><float name="tau0" value="1"/></bsdf></scene>',
     "plugin.xml": '<scene version="3.0.0"><shape type="sphre"/></scene>',
     "blind.xml": '<scene version="3.0.0"><shape type="sphere"/></scene>',
+    "blind.json": '{"type": "scene", "sensor": {"type": "perspective"}}',
+    "spectral.json": '{"type": "scene", "integrator": {"type": "aov", "aovs": "d:depth"}, "sensor": {"type": '
+    '"perspective", "film": {"type": "specfilm", "red": {"type": "regular", "wavelength_min": 500, '
+    '"wavelength_max": 600, "values": "1, 1"}}}}',
     "binary.png": "",
 }
 BAD = [
@@ -58,6 +62,22 @@ BAD = [
     (("render", "plugin.xml"), "no plugin 'sphre'. Did you mean 'sphere'?"),
     (("render", "blind.xml"), "no scene with a sensor"),
     (("render", "blind.xml", "--preset", "gilded"), "--preset: a scene file has its own materials"),
+    (("render", "blind.json"), "it has no integrator"),
+    (("render", "-m", "llvm_ad_spectral", "spectral.json"), "the film is spectral, and has no colours for a PNG"),
+    (
+        ("render", "-m", "llvm_ad_spectral", "spectral.json", "-o", "x.exr"),
+        "the film is spectral, and cannot hold AOVs",
+    ),
+    (("render", "blind.json", "-D", "x"), "--define x: expected NAME=VALUE"),
+    (("render", "-D", "x=1"), "they are for scene files"),
+    (("render", "-s", "1"), "they are for scene files"),
+    (("show", "micrograin", "--json"), "micrograin is no preset"),
+    (("measure", "--preset", "worn-gold"), "error: alpha = {'type': 'bitmap'"),
+    (
+        ("measure", "vgroove", "--set", "distribution=phong", "--set", 'exponent={"type": "checkerboard"}'),
+        "exponent = ",
+    ),
+    (("measure", "micrograin", "--set", 'beta={"type": "checkerboard"}'), "error: beta = {"),
     (("check",), "give one of"),
     (("check", "difuse"), "Did you mean 'diffuse'?"),
     (("check", "sphere"), "'sphere' is not a material"),
@@ -75,6 +95,22 @@ def test_bad_input(asperity, tmp_path, arguments, culprit):
     assert culprit in result.output and "Traceback" not in result.output
     assert "Usage:" in result.output or len(result.stderr.strip().splitlines()) == 1
     assert {path.name for path in tmp_path.iterdir()} == set(FILES)
+
+
+def test_the_cause_of_an_error_of_dr_jit_is_said(asperity, monkeypatch):
+    def fail(*_):
+        raise RuntimeError("while rendering (see above).") from RuntimeError("the cause")
+
+    monkeypatch.setattr("asperity.cli.render.previews", fail)
+    assert asperity("render").stderr == "error: the cause\n"
+
+
+def test_a_machine_that_is_too_small(asperity, monkeypatch):
+    def fail(*_):
+        raise MemoryError
+
+    monkeypatch.setattr("asperity.cli.render.previews", fail)
+    assert asperity("render").stderr == "error: out of memory\n"
 
 
 def test_debug_shows_the_traceback(asperity):

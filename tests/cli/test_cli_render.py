@@ -120,6 +120,41 @@ def test_xml_scene_with_aovs_resized(asperity, tmp_path, variant):
     assert set(channels) == {"R", "G", "B", "distance.T", "base.R", "base.G", "base.B"}
 
 
+def test_a_render_that_is_not_finite_says_so(asperity, tmp_path, monkeypatch):
+    render = mi.render
+
+    def broken(*arguments, **options):
+        image = np.array(render(*arguments, **options))
+        image[3, 5] = np.nan
+        image[2, 7, 1] = np.inf
+        return image
+
+    monkeypatch.setattr(mi, "render", broken)
+    result = asperity("render", *TINY, "--compare", "gilded", "-o", "out")
+    assert result.exit_code == 1
+    line = "warning: 2 of 1024 pixels are not finite (NaN or infinite); the first is in row 2, column 7"
+    assert result.stderr.count(line) == 2 and "mean difference: 0." in result.stdout
+    assert files(tmp_path) == ["out.exr", "out.png"]
+
+
+def test_what_people_use_of_the_mitsuba_command(asperity, tmp_path):
+    (tmp_path / "scene.json").write_text(
+        json.dumps(
+            {
+                "type": "scene",
+                "integrator": {"type": "path"},
+                "a": {"type": "perspective", "film": {"type": "hdrfilm", "width": 2, "height": 2}},
+                "b": {"type": "perspective", "film": {"type": "hdrfilm", "width": "$wide", "height": 2,
+                                                      "pixel_format": "luminance"}},
+                "light": {"type": "constant"},
+            }
+        )
+    )  # fmt: skip
+    result = asperity("render", "scene.json", "-m", "scalar_rgb", "-D", "wide=5", "-s", "1", "-o", "out.exr")
+    assert result.exit_code == 0, result.output
+    assert mi.variant() == "scalar_rgb" and pixels("out.exr").shape == (2, 5)
+
+
 def test_passes_are_squares_and_fit_into_memory():
     assert [pass_size(n, 1000) for n in (100, 16, 15, 4, 3, 1)] == [16, 16, 4, 4, 1, 1]
     assert pass_size(100, 640 * 640) == 4

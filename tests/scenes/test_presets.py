@@ -118,7 +118,7 @@ def test_files_are_found_beside_the_description_and_matrices_scale_them(tmp_path
     [
         (b"", "line 1, column 1: Expecting value"),
         (b'{"type": "diffuse",\n  "reflectance": }', "line 2, column 18: Expecting value"),
-        (b"\xff\xfe", "utf-8"),
+        (b"\xff", "utf-8"),
         (b'{"type": "diffuse", "type": "plastic"}', "'type' is given twice"),
         ([DIFFUSE], "not an object in braces"),
         ({"material": "diffuse"}, 'material is "diffuse", not an object in braces'),
@@ -138,6 +138,12 @@ def test_bad_files_are_named(tmp_path, content, words):
     with pytest.raises(UnreadableFileError, match=words) as error:
         presets.read(path := written(tmp_path, content))
     assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_what_windows_writes_is_read(tmp_path, encoding):
+    text = '{"title": "Grün", "material": {"type": "diffuse"}}'
+    assert presets.read(written(tmp_path, text.encode(encoding))).title == "Grün"
 
 
 @pytest.mark.parametrize(("name", "words"), [("none.json", "no such file"), ("material.yaml", "ending is '.yaml'")])

@@ -28,7 +28,7 @@ ADVICE = {
 def doctor() -> None:
     """Find out which variants work here, and what to do about those that do not."""
     facts = Table("what", "found")
-    for row in (*versions().items(), *libraries().items()):
+    for row in (versions() | cores() | libraries()).items():
         facts.add_row(*row)
     trials, advice, works = Table("variant", "works", "details"), [], {}
     for variant in TRIALS:
@@ -36,7 +36,7 @@ def doctor() -> None:
             works[variant], details = attempt(variant)
         trials.add_row(variant, "yes" if works[variant] else "no", details)
         if not works[variant]:
-            advice.append(f"{variant}: {ADVICE.get(variant) or llvm_advice()}")
+            advice.append(f"{variant}: {ADVICE.get(variant) or llvm.cure()}")
     out = console.stdout()
     out.print(facts, trials, *advice, sep="\n")
     raise typer.Exit(0 if works["llvm_ad_rgb"] or works["cuda_ad_rgb"] else 1)
@@ -56,15 +56,21 @@ def versions() -> dict[str, str]:
 
 
 def libraries() -> dict[str, str]:
-    """The LLVM that asperity brought, and the one that Dr.Jit is told to use."""
+    """The LLVM that asperity brought, what was passed over, and the one that Dr.Jit is told to use."""
     path = os.environ.get("DRJIT_LIBLLVM_PATH")
     # `import asperity` has set the variable by now, unless the user had.
     by = "asperity's choice" if path == str(llvm.bundled()) else "your choice"
-    missing = "" if path is None or Path(path).is_file() else "; there is no such file"
-    return {
-        "LLVM with asperity": str(llvm.bundled() or "none for this platform"),
-        "DRJIT_LIBLLVM_PATH": f"{path} ({by}{missing})" if path else "not set: Dr.Jit searches the system",
-    }
+    fault = llvm.flaw(Path(path)) if path else None
+    told = f"{path} ({by}{f'; {fault}' if fault else ''})" if path else "not set: Dr.Jit searches the system"
+    passed_over = {"unusable": "\n".join(damages)} if (damages := llvm.damages()) else {}
+    return {"LLVM with asperity": str(llvm.bundled() or "none"), **passed_over, "DRJIT_LIBLLVM_PATH": told}
+
+
+def cores() -> dict[str, str]:
+    """How many cores this process may use, if that is one only."""
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    found = "1; asperity gives Mitsuba a second thread, without which it waits for ever at EXR files"
+    return {"cores": found} if count == 1 else {}
 
 
 def attempt(variant: str) -> tuple[bool, str]:
@@ -81,7 +87,7 @@ def attempt(variant: str) -> tuple[bool, str]:
 
 
 def trial(variant: str) -> None:
-    """Render a micrograin in four by four pixels, and print which LLVM did it."""
+    """Render a micrograin in four by four pixels, write an EXR file to memory, and print which LLVM did it."""
     import mitsuba as mi
 
     mi.set_variant(variant)
@@ -95,7 +101,9 @@ def trial(variant: str) -> None:
         },
         parallel=False,
     )
-    brightness = sum(mi.render(scene, spp=1).array) / 48
+    image = mi.render(scene, spp=1)
+    mi.Bitmap(image).write(mi.MemoryStream(), mi.Bitmap.FileFormat.OpenEXR)
+    brightness = sum(image.array) / 48
     if not 0 < brightness < 2:
         raise RuntimeError(f"renders, but wrongly: the mean of the picture is {brightness:g}")
     version = llvm.loaded_version() if variant.startswith("llvm_") else None
@@ -107,11 +115,3 @@ def loaded_library() -> str:
     maps = Path("/proc/self/maps")
     lines = maps.read_text().splitlines() if maps.exists() else []
     return next((line.split()[-1] for line in lines if "libLLVM" in line), os.environ.get("DRJIT_LIBLLVM_PATH", "?"))
-
-
-def llvm_advice() -> str:
-    """What to do if the LLVM variants do not work."""
-    path = os.environ.get("DRJIT_LIBLLVM_PATH")
-    if path and path != str(llvm.bundled()):
-        return f"Unset DRJIT_LIBLLVM_PATH, or let it name a libLLVM of version {llvm.OLDEST_WORKING} or newer."
-    return f"Install LLVM {llvm.OLDEST_WORKING} or newer, and set DRJIT_LIBLLVM_PATH to its libLLVM."

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import re
+import sys
+import unicodedata
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -12,7 +16,7 @@ from typer.core import TyperGroup
 
 from asperity.errors import AsperityError
 
-FAULTS = (AsperityError, RuntimeError, ImportError, OSError)
+FAULTS = (AsperityError, RuntimeError, ImportError, OSError, MemoryError)
 """Of what was asked for, or of the machine. Mitsuba knows only RuntimeError, and ImportError for variants."""
 
 NOISE = {
@@ -26,6 +30,13 @@ NOISE = {
 
 class OneLineErrors(TyperGroup):
     """Prints faults as one line, without a traceback; anything else is a bug of ours, and keeps its own."""
+
+    def main(self, *args: Any, **options: Any) -> Any:
+        """Begin, whatever the terminal is."""
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="spelt")
+        return super().main(*args, **options)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Let ``--debug`` stand anywhere: it is what one adds at the end of the command that just failed."""
@@ -42,8 +53,22 @@ class OneLineErrors(TyperGroup):
         except FAULTS as error:
             if ctx.params["debug"]:
                 raise
-            typer.echo(f"{typer.style('error:', fg='red')} {one_line(str(error))}", err=True)
+            cause: BaseException = error
+            while "(see above)" in str(cause) and cause.__cause__:  # Dr.Jit, of the error before
+                cause = cause.__cause__
+            typer.echo(f"{typer.style('error:', fg='red')} {one_line(str(cause)) or 'out of memory'}", err=True)
             raise typer.Exit(2) from error
+
+
+def spelt(error: UnicodeError) -> tuple[str, int]:
+    """What to print where a terminal has no θ, such as one of cp1252: theta; or a question mark."""
+    assert isinstance(error, UnicodeEncodeError)
+    names = (unicodedata.name(letter, "") for letter in error.object[error.start : error.end])
+    greek = (re.fullmatch("GREEK SMALL LETTER (.*)", name) for name in names)
+    return "".join(letter[1].lower() if letter else "?" for letter in greek), error.end
+
+
+codecs.register_error("spelt", spelt)
 
 
 def one_line(message: str) -> str:

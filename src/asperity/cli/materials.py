@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -46,11 +47,11 @@ def apply(material: dict[str, Any], settings: list[str]) -> None:
 
 
 def value(text: str) -> Any:
-    """JSON, or else a word; three numbers are a colour."""
+    """JSON, or else a word; three numbers are a colour, and numbers may begin or end with their point."""
     try:
         parsed = json.loads(text)
     except json.JSONDecodeError:
-        return text
+        return float(text) if re.fullmatch(r"[+-]?(\d+\.|\.?\d)\d*(e[+-]?\d+)?", text, re.IGNORECASE) else text
     colour = isinstance(parsed, list) and len(parsed) == 3 and all(isinstance(x, int | float) for x in parsed)
     return {"type": "rgb", "value": parsed} if colour else parsed
 

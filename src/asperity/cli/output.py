@@ -15,6 +15,8 @@ import typer
 from asperity.errors import ParameterError
 from asperity.files import TakenError, atomically, locked
 
+from . import channels
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -142,8 +144,5 @@ def write(path: Path, image: np.ndarray, names: list[str]) -> None:
         if path.suffix.lower() == ".exr":
             bitmap = mi.Bitmap(image, mi.Bitmap.PixelFormat.MultiChannel, names)
         else:
-            letters = "".join(name[-1] for name in names)
-            colours = next(len(kind) for kind in ("RGBA", "RGB", letters[:1]) if letters.startswith(kind))
-            bitmap = mi.Bitmap(image[..., :colours])
-            bitmap = bitmap.convert(component_format=mi.Struct.Type.UInt8, srgb_gamma=True)
+            bitmap = channels.png(image, names)
         bitmap.write(str(part))

@@ -22,23 +22,27 @@ SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if 
 """That ask for an end; Windows has fewer."""
 
 
-def average(scenes: list[Any], spp: int, seed: int, interrupted: Collection[Any] = ()) -> tuple[list[np.ndarray], int]:
-    """Images (height, width, channels) of the scenes, and how many samples per pixel they got.
+def average(
+    scenes: list[Any], spp: int, seed: int, sensor: int = 0, interrupted: Collection[Any] = ()
+) -> tuple[list[np.ndarray], int]:
+    """Images (height, width, channels) from a sensor of the scenes, and how many samples per pixel they got.
 
     They get fewer than ``spp`` if ``interrupted`` is no longer empty after a pass.
     """
     import mitsuba as mi
     import numpy as np
 
-    sensor = scenes[0].sensors()[0]
-    pixels = math.prod(sensor.film().crop_size())
+    film, sampler = scenes[0].sensors()[sensor].film(), scenes[0].sensors()[sensor].sampler()
+    pixels = math.prod(film.crop_size())
     seeds, totals, done = np.random.default_rng(seed), [np.zeros(1)] * len(scenes), 0
     with console.progress("spp") as progress:
         task = progress.add_task("compiling", total=spp)
         while not done or (done < spp and not interrupted):
             n, pass_seed = pass_size(spp - done, pixels), int(seeds.integers(2**32))
-            images = [np.array(mi.render(scene, spp=n, seed=pass_seed), dtype=np.float64) for scene in scenes]
-            n = sensor.sampler().sample_count()  # some samplers round it up
+            images = [
+                np.array(mi.render(scene, sensor=sensor, spp=n, seed=pass_seed), dtype=np.float64) for scene in scenes
+            ]
+            n = sampler.sample_count()  # some samplers round it up
             totals, done = [total + n * image for total, image in zip(totals, images)], done + n
             progress.update(task, completed=done, description="rendering")
     return [total / done for total in totals], done

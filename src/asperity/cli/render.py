@@ -11,7 +11,7 @@ import typer
 
 from asperity.errors import ParameterError
 
-from . import console, materials, output, passes, scene_files, variants
+from . import channels, console, materials, output, passes, scene_files, variants
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,35 +53,51 @@ def render(
     size: Annotated[Any, typer.Option(parser=parse_size, metavar="SIZE", help="512, or 640x360.")] = None,
     spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Another seed, another noise.")] = 0,
+    sensor: Annotated[int, typer.Option("--sensor", "-s", min=0, help="Of a scene with several; counted from 0.")] = 0,
+    define: Annotated[
+        list[str] | None, typer.Option("--define", "-D", metavar="NAME=VALUE", help="For $NAME in a scene. Repeatable.")
+    ] = None,
     variant: variants.Variant = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="PNG or EXR; both, if it has no ending. Default: a new asperity.")
     ] = None,
     force: output.Force = False,
 ) -> None:
-    """Render a material on the preview scene, or a scene file, to a PNG and an EXR."""
+    """Render a material on the preview scene, or a scene file, to a PNG and an EXR.
+
+    The exit code is 1 if the picture has pixels that are not finite.
+    """
     start = time.perf_counter()
-    inputs = (scene, material, env and Path(env), object_ and Path(object_), *(settings or []))
+    inputs = (scene, material, env and Path(env), object_ and Path(object_), *(settings or []), *(define or []))
     files = ctx.with_resource(output.files(out, output.NAME, output.FORMATS, force=force, inputs=inputs))
     values = (preset, material, settings, object_, env, compare)
     given = {name: value for name, value in zip(PREVIEW, values) if value not in (None, [])}
     if scene and given:
         raise ParameterError(f"--{', --'.join(given)}: a scene file has its own materials, objects and lights.")
+    if not scene and (sensor or define):
+        raise ParameterError("--sensor, --define: they are for scene files.")
     with console.status("loading the scene"):
         variants.choose(variant)
-        scenes = [scene_files.load(scene, size)] if scene else previews(given, size or SIZE)
-        spp = spp or (scenes[0].sensors()[0].sampler().sample_count() if scene else SPP)
+        if scene:
+            scenes = [scene_files.load(scene, size, sensor, scene_files.parse_defines(define or []))]
+        else:
+            scenes = previews(given, size or SIZE)
+        channels.check(scenes[0], sensor, {file.suffix.lower() for file in files})
+        spp = spp or (scenes[0].sensors()[sensor].sampler().sample_count() if scene else SPP)
     loaded = time.perf_counter()
 
-    images, done = passes.average(scenes, spp, seed, ctx.with_resource(passes.interruptible()))
+    images, done = passes.average(scenes, spp, seed, sensor, ctx.with_resource(passes.interruptible()))
     image = beside(*images) if compare else images[0]
-    names = scene_files.channel_names(scenes[0], image.shape[-1])
+    names = channels.names(scenes[0], image.shape[-1], sensor)
     for file in files:
         output.write(file, image, names)
     rendered = time.perf_counter()
     written = f"{'stopped early: ' if done < spp else ''}{' and '.join(map(str, files))}: {done} samples per pixel"
     times = f"{rendered - start:.1f} s (loading {loaded - start:.1f}, rendering {rendered - loaded:.1f})"
     typer.echo(f"{written}, {times}")
+    if faults := [fault for one in images if (fault := channels.fault(one))]:
+        typer.echo("\n".join(f"warning: {fault}" for fault in faults), err=True)
+        raise typer.Exit(1)
     if not (scene or given):
         typer.echo("\n  ".join(("Try next:", *NEXT)))
 
@@ -106,11 +122,12 @@ def beside(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Both images and their absolute difference, side by side, the difference multiplied so that it can be seen."""
     import numpy as np
 
-    difference = np.abs(a - b)
+    with np.errstate(invalid="ignore"):  # both may be infinite
+        difference = np.abs(a - b)
+    sound = np.isfinite(difference)
+    seen, total = difference[sound] if sound.any() else np.zeros(1), (a + b)[sound].sum()
     # A power of two; the brightest percent may clip, and rounding errors stay dark.
-    factor = 2.0 ** np.clip(np.floor(-np.log2(np.quantile(difference, 0.99) + 1e-9)), 0, 8)
-    error = difference.mean() / ((a + b).mean() / 2)
-    typer.echo(
-        f"mean difference: {difference.mean():.3g} or {error:.2%} of the mean; shown times {factor:g}, at the right"
-    )
+    factor = 2.0 ** np.clip(np.floor(-np.log2(np.quantile(seen, 0.99) + 1e-9)), 0, 8)
+    error = 2 * seen.sum() / total if total else 0
+    typer.echo(f"mean difference: {seen.mean():.3g} or {error:.2%} of the mean; shown times {factor:g}, at the right")
     return np.concatenate([a, b, factor * difference], axis=1)

@@ -43,7 +43,7 @@ def read(path: str | Path) -> Preset:
     """
     path = readable("material", path, FORMATS)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_distinct)
+        content = json.loads(path.read_bytes(), object_pairs_hook=_distinct)  # any UTF, and its byte order mark
         return _preset(path, content)
     except json.JSONDecodeError as error:
         reason = f"line {error.lineno}, column {error.colno}: {error.msg}"
@@ -98,7 +98,7 @@ def _complete(node: dict[str, Any], where: str, folder: Path) -> None:
         if isinstance(value, dict):
             _complete(value, name, folder)
         elif key == "filename":
-            node[key] = str(folder / str(value))
+            node[key] = str((folder / str(value)).resolve())  # so that `asperity show --json` may be read elsewhere
             if not Path(node[key]).is_file():
                 raise ValueError(f"{name}: there is no file {node[key]!r}")
         elif key == "to_uv":

@@ -32,9 +32,7 @@ class ExplicitGrains:
 
     def __post_init__(self):
         for name in ("tau_0", "beta_x", "beta_y"):
-            value = getattr(self, name)
-            if not isinstance(value, int | float):
-                raise ParameterError(f"{name} = {value!r}: simulated grains are alike everywhere; expected one number.")
+            _number(name, getattr(self, name))
         if not 0 <= self.tau_0 < 1:
             raise ParameterError(
                 f"tau_0 = {self.tau_0:g}: simulated grains cover [0, 1) of the base; 1 needs endless many."
@@ -62,6 +60,8 @@ class ExplicitGrains:
             grain = {"type": "plastic"} | {name: model[name] for name in ("int_ior", "ext_ior", "diffuse_reflectance")}
         else:
             grain = {"type": "conductor"} | ({name: model[name] for name in metal} or {"material": "none"})
+        if "beta" in given:  # by the name that was given
+            _number("beta", model["beta"])
         beta_x, beta_y = (model[name] if name in given else model["beta"] for name in ("beta_x", "beta_y"))
         return cls(model["tau_0"], beta_x, beta_y, grain, model["base"] or BLACK)
 
@@ -107,6 +107,11 @@ class ExplicitGrains:
             }
         window = np.sqrt(width * depth * min(1, COHERENT / self.grains))
         return Tile(mi.load_dict(shapes, parallel=False), width, depth, -1e-3, 1 + 1e-3, True, window)
+
+
+def _number(name: str, value: Any) -> None:
+    if not isinstance(value, int | float):
+        raise ParameterError(f"{name} = {value!r}: simulated grains are alike everywhere; expected one number.")
 
 
 def _tensor(values: np.ndarray) -> mi.TensorXf:

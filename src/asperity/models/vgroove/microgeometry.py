@@ -31,17 +31,17 @@ class ExplicitGrooves:
 
     def __post_init__(self):
         for name in ("alpha_u", "alpha_v"):
-            alpha = getattr(self, name)
-            if not (isinstance(alpha, int | float) and alpha > 0):
-                raise ParameterError(
-                    f"{name} = {alpha!r}: simulated grooves are alike everywhere; expected one number above 0."
-                )
+            _number(name, alpha := getattr(self, name))
+            if not alpha > 0:
+                raise ParameterError(f"{name} = {alpha!r}: expected a number above 0.")
 
     @classmethod
     def of(cls, model: dict[str, Any], given: set[str]) -> ExplicitGrooves:
         """The grooves that a ``vgroove`` BSDF models; of its parameters the scene has ``given`` some itself."""
         for name in {"reflectivity", "edge_tint"} & given:
             raise ParameterError(f"{name}: not simulated; give the metal by material, or by eta and k.")
+        for name in sorted({"alpha", "exponent"} & given):  # by the name that was given
+            _number(name, model[name])
         alpha = float(np.sqrt(2 / (model["exponent"] + 2))) if "exponent" in given else model["alpha"]
         alpha_u, alpha_v = (model[name] if name in given else alpha for name in ("alpha_u", "alpha_v"))
         metal = {name: model[name] for name in {"material", "eta", "k"} & given} or {"material": "none"}
@@ -66,3 +66,8 @@ class ExplicitGrooves:
             return Shape(mi.Vector2f(cos, sin), first, first)
         partner = kind.sample_partner(alpha, *(rng.next_float32() for _ in range(3)))
         return Shape(mi.Vector2f(cos, sin), first, dr.atan2(*partner))
+
+
+def _number(name: str, value: Any) -> None:
+    if not isinstance(value, int | float):
+        raise ParameterError(f"{name} = {value!r}: simulated grooves are alike everywhere; expected one number.")
