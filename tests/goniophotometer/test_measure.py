@@ -100,7 +100,7 @@ def test_merging_and_continuing():
     both = merge([a, b])
     assert np.array_equal(both.energy, merge([b, a]).energy)
     assert np.array_equal(both.energy.sum(axis=0), a.energy.sum(axis=0) + b.energy.sum(axis=0))
-    more = measure(geometry, [(30, 0), (60, 0)], seed=1, before=a, paths=2**17, tiles=8)
+    more = measure(geometry, [(30, 0), (60, 0)], seed=1, before=a, **FEW)
     assert more.total_paths == 2 * a.total_paths and np.all(more.energy >= a.energy)
     assert a.total_paths == 2 * FEW["paths"]  # untouched
     with pytest.raises(ParameterError, match="seed 1 is there twice"):
@@ -139,9 +139,7 @@ def test_where_it_was_stopped_does_not_matter(monkeypatch, tmp_path, sensor):
         part.save(tmp_path / f"{k}.npz")
         rest = measure(geometry, incident, sensor=sensor, before=Measurement.load(tmp_path / f"{k}.npz"))
         assert np.array_equal(rest.paths, once.paths) and np.array_equal(rest.energy, once.energy)
-    assert np.array_equal(measure(geometry, incident, sensor=sensor, before=once).energy, once.energy)
-    with pytest.raises(ParameterError, match="paths = 4000: there are 500"):
-        measure(geometry, incident, sensor=sensor, before=once, paths=4000)
+    assert np.array_equal(measure(geometry, incident, before=once, **few).paths, 2 * once.paths)
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def measure(
     phi: Annotated[Any, typer.Option(parser=numbers, metavar="DEGREES", help="Every theta gets every phi.")] = "0",
     orders: Annotated[int | None, typer.Option(min=1, help="Highest order of scattering; all if left out.")] = None,
     apart: Annotated[int, typer.Option(min=1, help="How many orders are counted apart.")] = 1,
-    paths: Annotated[float | None, typer.Option(help="Per direction of incidence, in all; 4e6 if left out.")] = None,
+    paths: Annotated[float, typer.Option(help="Per direction of incidence.")] = 4e6,
     tiles: Annotated[int | None, typer.Option(min=2, help="How many pieces of surface; 32 if left out.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Another seed, other pieces: see merge.")] = None,
     sensor: Annotated[str | None, typer.Option(help="hemisphere; retro, mirror or normal (windows); points.")] = None,
@@ -91,7 +91,7 @@ def measure(
     tensor: Annotated[Path | None, typer.Option(metavar="BSDF", help="RGL's tensor file, to write as well.")] = None,
     before: Annotated[
         Path | None,
-        typer.Option("--continue", metavar="NPZ", help="Go on with this file, up to its paths, or --paths."),
+        typer.Option("--continue", metavar="NPZ", help="Take up this file; if it is finished, add paths to it."),
     ] = None,
     checkpoint: Annotated[float, typer.Option(min=0, metavar="SECONDS", help="How often to save what there is.")] = 60,
     force: output.Force = False,
@@ -148,8 +148,6 @@ def measure(
     typer.echo(f"{early}{out}: {measured.total_paths:.3g} paths, {seconds:.1f} s, {rate:.2g} paths/s")
     if early:
         typer.echo(f"The same command with --continue {out} goes on.")
-    elif earlier and measured.total_paths == earlier.total_paths:
-        typer.echo("It had them already: ask for more by --paths.")
     if tensor is not None:
         tensor_file.write(measured, tensor)
         typer.echo(tensor)

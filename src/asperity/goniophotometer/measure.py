@@ -38,7 +38,7 @@ def measure(
     sensor: Sensor | None = None,
     orders: int | None = None,
     apart: int = 1,
-    paths: float | None = None,
+    paths: float = PATHS,
     tiles: int = TILES,
     seed: int = 0,
     wavelengths: Sequence[float] | None = None,
@@ -57,12 +57,13 @@ def measure(
     sensor : a `Hemisphere` (the default), a `Window`, or `Points` for next-event estimation
     orders : the highest order of scattering that is followed; all of them if None
     apart : how many orders are counted apart; the last one takes all that follow
-    paths : per direction, shared among the tiles; those of ``before`` included; 4 million if None
+    paths : per direction, shared among the tiles
     tiles : how many tiles are drawn; the standard error comes from their differences, so at least 2
     seed : the same seed gives the same result, bit for bit, on any machine of the same kind
     wavelengths : in nm, as many as the spectral variant has channels
-    before : a measurement of the same thing, to go on with; to its own goal if ``paths`` is None. If it was stopped,
-        the result is that of one that was not, bit for bit. (Other seeds, more tiles: see `merge`.)
+    before : a measurement of the same thing. If it was stopped, it is taken up to what it was asked for, whatever
+        ``paths`` is: the result is that of one that was not stopped, bit for bit. If it is finished, its tiles get as
+        many ``paths`` more. (Other seeds, more tiles: see `merge`.)
     about : what else to note in the result
     progress(done, total) : called after each batch of paths
     stop() : asked after each batch; True ends the measurement with what there is
@@ -73,7 +74,7 @@ def measure(
     """
     sensor = sensor or Hemisphere()
     check_angles(incident)
-    check_effort(incident, PATHS if paths is None else paths, tiles, seed)
+    check_effort(incident, paths, tiles, seed)
     for name, order in (("orders", orders), ("apart", apart)):
         if order is not None:
             _check_whole(name, order, 1)
@@ -85,8 +86,9 @@ def measure(
     # Each path of a batch aims at one of the points: every point must get as many.
     share = sensor.cells if isinstance(sensor, Points) else 1
     batch = max(BATCH // share, 1) * share
-    if before is None or paths is not None:
-        result = replace(result, goal=_goal(result, PATHS if paths is None else paths, share))
+    if result.finished:
+        quota = -(-int(paths) // (len(result.labels) * share)) * share
+        result = replace(result, goal=result.paths.max(axis=1) + quota)
     missing = np.maximum(result.goal[:, None] - result.paths, 0)
     done, total, due = 0, int(missing.sum()), time.monotonic() + interval
     while done < total:
@@ -123,15 +125,6 @@ def _saved(checkpoint: Callable[[Measurement], None], result: Measurement) -> fl
     return end + 9 * (end - start)
 
 
-def _goal(start: Measurement, paths: float, share: int) -> np.ndarray:
-    """How many paths each tile is to have for each direction: as many as all others, and a multiple of ``share``."""
-    tiles, most = len(start.labels), int(start.paths.sum(axis=0).max())
-    quota = -(-int(paths) // (tiles * share)) * share
-    if quota * tiles < most:
-        raise ParameterError(f"paths = {paths:g}: there are {most:g} per direction already; ask for more than that.")
-    return np.full(tiles, quota)
-
-
 def _empty(geometry, incident, sensor, settings, tiles, seed, about) -> Measurement:
     """A measurement of no paths."""
     channels = dr.size_v(mi.UnpolarizedSpectrum)
@@ -151,7 +144,6 @@ def _empty(geometry, incident, sensor, settings, tiles, seed, about) -> Measurem
         np.stack([np.full(tiles, seed), np.arange(tiles)], axis=1),
         np.zeros(shape[:2], dtype=np.int64),
         np.zeros(shape, dtype=np.uint64),
-        np.zeros(tiles, dtype=np.int64),
     )
 
 

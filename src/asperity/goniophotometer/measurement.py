@@ -18,7 +18,7 @@ from .tracer import BELOW, CUT, ELSEWHERE, EXTRA, UNIT
 
 FORMATS = (".npz",)
 ARRAYS = {"incident": "f", "labels": "iu", "paths": "iu", "energy": "u", "goal": "iu"}
-"""What a file must hold to go on from it, and the kinds of numbers (NumPy's letters)."""
+"""What a file holds to go on from it, and the kinds of numbers (NumPy's letters); ``goal`` may be missing."""
 
 
 class Estimate(NamedTuple):
@@ -55,7 +55,11 @@ class Measurement:
     labels: np.ndarray  # (tiles, 2): seed and number
     paths: np.ndarray  # (tiles, directions)
     energy: np.ndarray  # (tiles, directions, orders, cells + EXTRA, channels), in units
-    goal: np.ndarray  # (tiles,): how many paths each direction is to get
+    goal: np.ndarray = None  # type: ignore[assignment]  # (tiles,): paths each direction is to get; by default, has
+
+    def __post_init__(self):
+        if self.goal is None:
+            object.__setattr__(self, "goal", self.paths.max(axis=1, initial=0))
 
     @cached_property
     def sensor(self) -> sensors.Sensor:
@@ -162,7 +166,9 @@ class Measurement:
         path = readable("measurement", path, FORMATS)
         try:
             with np.load(path, allow_pickle=False) as file:
-                found = Measurement(json.loads(str(file["about"])), **{name: file[name] for name in ARRAYS})
+                found = Measurement(
+                    json.loads(str(file["about"])), **{name: file[name] for name in ARRAYS.keys() & set(file.files)}
+                )
             _check_whole(found)
         except Exception as error:  # of zipfile, zlib, NumPy and json: damage shows in any way
             raise UnreadableFileError("measurement", path, FORMATS, f"not written by asperity ({error})") from error
