@@ -9,10 +9,12 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 
 from . import llvm, threads
 from .microfacet.albedo import directional_albedo
+from .microfacet.quadrature import RULES, rule
 
 ALBEDO_SAMPLES = 256
 
@@ -48,6 +50,7 @@ def _bsdf(model_class: Any, variant: str) -> type:
         def __init__(self, props: mi.Properties) -> None:
             self.model = model_class.parse(props)  # first: Mitsuba's constructor makes this BSDF known to all threads
             mi.BSDF.__init__(self, props)
+            self.parts = _parts(self.model)
             self.m_components = self.model.components()
             self.m_flags = 0
             for flags in self.m_components:
@@ -90,6 +93,7 @@ def _texture(model_class: Any, variant: str) -> type:
         def __init__(self, props: mi.Properties) -> None:
             mi.Texture.__init__(self, props)
             self.model = model_class.parse(props)
+            self.parts = _parts(self.model)
 
         def eval_1(self, si, active=True):
             return self.model.eval(si, active)
@@ -122,6 +126,7 @@ def _phase(model_class: Any, variant: str) -> type:
         def __init__(self, props: mi.Properties) -> None:
             mi.PhaseFunction.__init__(self, props)
             self.model = model_class.parse(props)
+            self.parts = _parts(self.model)
             self.m_flags = int(mi.PhaseFunctionFlags.Anisotropic)
 
         def eval_pdf(self, ctx, mei, wo, active=True):
@@ -136,6 +141,12 @@ def _phase(model_class: Any, variant: str) -> type:
 
     Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
     return Plugin
+
+
+def _parts(model: Any) -> tuple[Any, ...]:
+    """All arrays that a model uses, where ``dr.freeze`` looks for them: it knows containers, but not our classes."""
+    rules = [rule(n, mi.Float) for n in RULES] if dr.is_jit_v(mi.Float) else []
+    return vars(model), rules
 
 
 def _traverse(self: Any, callback: mi.TraversalCallback) -> None:

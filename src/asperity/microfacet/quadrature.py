@@ -10,12 +10,22 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+RULES = (4, 5, 6, 8, 12, 16)
+"""Numbers of nodes that models use in recorded loops."""
+
 
 @cache
 def gauss_legendre(n: int) -> tuple[list[float], list[float]]:
     """Nodes and weights of the n-point Gauss-Legendre rule on [0, 1]."""
     x, w = np.polynomial.legendre.leggauss(n)
     return list(map(float, (x + 1) / 2)), list(map(float, w / 2))
+
+
+@cache
+def rule(n: int, number: type) -> tuple[Any, Any]:
+    """The nodes and weights as arrays of ``number``, made once."""
+    nodes, weights = gauss_legendre(n)
+    return number(nodes), number(weights)
 
 
 def accumulate(term: Callable[[Any, Any], tuple], count: Any, start: tuple, captured: Any) -> tuple:
@@ -52,16 +62,15 @@ def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, 
     fast as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives
     need the copies.
     """
-    nodes, weights = gauss_legendre(n)
-    if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(type(like)(nodes[0]), captured))):
-        terms = [[weight * value for value in f(node, captured)] for node, weight in zip(nodes, weights)]
+    Float, first = type(like), gauss_legendre(n)[0][0]
+    if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(Float(first), captured))):
+        terms = [[weight * value for value in f(node, captured)] for node, weight in zip(*gauss_legendre(n))]
         return tuple(map(sum, zip(*terms)))
-    Float, UInt = type(like), dr.uint32_array_t(type(like))
-    start = tuple(dr.zeros(type(value)) for value in f(Float(nodes[0]), captured))
-    nodes, weights = Float(nodes), Float(weights)
+    start = tuple(dr.zeros(type(value)) for value in f(Float(first), captured))
+    nodes, weights = rule(n, Float)
 
     def term(index, captured):
         weight = dr.gather(Float, weights, index)
         return tuple(weight * value for value in f(dr.gather(Float, nodes, index), captured))
 
-    return accumulate(term, UInt(n), start, captured)
+    return accumulate(term, dr.uint32_array_t(Float)(n), start, captured)

@@ -8,6 +8,7 @@ follows from the exact form factors of the furnace. Reciprocal; closes the white
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -36,24 +37,30 @@ class Loss(NamedTuple):
     area: Any  # exposed area of the grains over that of the plane, H_S
 
 
+@dataclass
 class LossTable:
-    """Losses for constant ``beta_x`` and ``beta_y`` and any filling factor; ``diffuse`` grains, or mirrors.
+    """Losses for constant ``beta_x`` and ``beta_y`` and any filling factor, as ratios to it.
 
-    ``shaded(shadows, h)`` is the choice of masking.
+    All of it is proportional to tau_0 where that is small.
     """
 
-    def __init__(self, beta_x: float, beta_y: float, diffuse: bool, shaded: Callable[[Shadows, Any], Any]):
-        self.beta_x, self.beta_y = beta_x, beta_y
-        self.azimuths = 1 if beta_x == beta_y else AZIMUTHS
+    beta_x: float
+    beta_y: float
+    losses: Any  # L_S and L_B over azimuth, cosine and filling factor
+    means: Any  # of `Loss`, over the filling factor
+
+    @classmethod
+    def made(cls, beta_x: float, beta_y: float, diffuse: bool, shaded: Callable[[Shadows, Any], Any]) -> LossTable:
+        """The table for ``diffuse`` grains, or mirrors; ``shaded(shadows, h)`` is the choice of masking."""
         tau_0 = np.maximum(np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2, SPARSEST)  # dense at both ends
-        root, azimuth = np.linspace(0, 1, COSINES), np.linspace(0, np.pi / 2, self.azimuths)
+        azimuths = 1 if beta_x == beta_y else AZIMUTHS
+        root, azimuth = np.linspace(0, 1, COSINES), np.linspace(0, np.pi / 2, azimuths)
         grid = np.meshgrid(tau_0, np.maximum(root**2, GRAZING), azimuth, indexing="ij")
         losses, visible = _losses(grid[0], grid[1], grid[2], beta_x, beta_y, diffuse, shaded)
-        # All of it is proportional to tau_0 where that is small, so the tables hold the ratio to it.
-        self.losses = _table(mi.Texture3f, losses / tau_0[:, None, None, None])
         mean = _hemispherical_mean(np.concatenate([losses, visible], axis=-1), root, azimuth, beta_x, beta_y)
         means = np.column_stack([mean, _exposed_area(tau_0, beta_x, beta_y)])
-        self.means = _table(mi.Texture1f, means / tau_0[:, None])
+        losses, means = losses / tau_0[:, None, None, None], means / tau_0[:, None]
+        return cls(beta_x, beta_y, _table(mi.Texture3f, losses), _table(mi.Texture1f, means))
 
     def at(self, tau_0) -> Loss:
         """What depends on the filling factor alone."""
@@ -63,7 +70,11 @@ class LossTable:
         """(L_S, L_B): shares of the light along ``w`` that meet grain or base first and are lost."""
         w = to_sphere(lift(w, self.beta_x, self.beta_y), self.beta_x, self.beta_y)
         azimuth = dr.atan2(dr.abs(w.y), dr.abs(w.x) + 1e-12) * (2 / dr.pi)
-        at = (_centre(azimuth, self.azimuths), _centre(dr.sqrt(w.z), COSINES), _centre(_filling(tau_0), FILLINGS))
+        at = (
+            _centre(azimuth, self.losses.shape[2]),
+            _centre(dr.sqrt(w.z), COSINES),
+            _centre(_filling(tau_0), FILLINGS),
+        )
         return [tau_0 * loss for loss in self.losses.eval(mi.Point3f(*at))]
 
 

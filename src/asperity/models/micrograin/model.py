@@ -179,7 +179,7 @@ class Micrograin(Declared):
             beta_x, beta_y = (self._constant(getattr(self, name)) for name in self.axes)
             if (beta_x, beta_y) != self.table_betas:
                 shaded = Shadows.union if self.masking == "correlated" else Shadows.sum
-                self.table, self.table_betas = LossTable(beta_x, beta_y, self.diffuse, shaded), (beta_x, beta_y)
+                self.table, self.table_betas = LossTable.made(beta_x, beta_y, self.diffuse, shaded), (beta_x, beta_y)
 
     def eval_pdf(self, ctx, si, wo, active):
         """(f |cos_o|, solid-angle density of `sample`): the sum of the lobes (Lucas 2024, Eq. 20)."""
