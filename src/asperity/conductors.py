@@ -16,7 +16,8 @@ from .microfacet.numerics import clamp, keep
 from .parameters import Colour, Parameter, Row, Spectrum
 
 ETA, K, TINT = Spectrum("", low=1e-3, high=100.0), Spectrum("", high=100.0), Colour("")
-"""Allowed ranges of a metal's parts."""
+PARTS = {"eta": ETA, "k": K, "reflectivity": TINT, "edge_tint": TINT}
+"""What a metal is given by, and the allowed ranges."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +106,12 @@ class Conductor(Parameter):
 
     def check(self, value: Any) -> None:
         """Check the textures of the chosen way."""
-        parts = {"eta": ETA, "k": K, "reflectivity": TINT, "edge_tint": TINT}
         for name, texture in self.children(value).items():
-            parts[name.removesuffix(self.suffix)].named(name).check(texture)
+            PARTS[name.removesuffix(self.suffix)].named(name).check(texture)
+
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """Of all four parts."""
+        return {name + self.suffix: (part.low, part.high) for name, part in PARTS.items()}
 
     def rows(self) -> Iterable[Row]:
         """A line for each name."""

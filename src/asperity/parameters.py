@@ -73,6 +73,10 @@ class Parameter:
         """What ``mi.traverse`` shall find in the parsed value: textures and nested BSDFs by name."""
         return {self.name: value} if isinstance(value, mi.Object) else {}
 
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """(least, greatest) of what `children` returns, by name."""
+        return {}
+
     def check(self, value: Any) -> None:
         """Raise ParameterError if the parsed value, perhaps updated since, is out of range."""
 
@@ -120,6 +124,10 @@ class Texture(Parameter):
             raise ParameterError(f"{name}: a colour or spectrum, where one number is expected.")
         self.check(texture)
         return texture
+
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """Both ends."""
+        return {self.name: (self.low, self.high)}
 
     def get(self, props: mi.Properties, name: str) -> Any:
         """Ask Mitsuba for the texture; unbounded, since a reflectance would be limited to [0, 1]."""
@@ -200,6 +208,25 @@ class Choice(Parameter):
         if given not in self.options:
             raise ParameterError(f"{self.name} = {given!r}. {suggestion(str(given), self.options)}")
         return given
+
+
+@dataclass(frozen=True)
+class Direction(Parameter):
+    """A direction in the scene: a vector of any length but zero, which is normalised."""
+
+    kind: ClassVar[str] = "vector"
+
+    def parse(self, props: mi.Properties) -> tuple[float, float, float]:
+        """The unit vector."""
+        given = props.get(self.name, self.default)
+        try:
+            x, y, z = (float(part) for part in given)
+        except (TypeError, ValueError) as error:
+            raise self.wrong(self.name, repr(given)) from error
+        length = math.hypot(x, y, z)
+        if not 0 < length < math.inf:  # nor NaN
+            raise self.wrong(self.name, repr([x, y, z]), where=", which has no direction")
+        return x / length, y / length, z / length
 
 
 @dataclass(frozen=True)
@@ -323,6 +350,10 @@ class Declared:
     def number(self, name: str, si: Any, active: Any) -> Any:
         """The number called ``name`` at a surface point."""
         return getattr(type(self), name).clamp(getattr(self, name).eval_1(si, active))
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """(least, greatest) by the name of a texture."""
+        return {name: limits for parameter in self.declarations() for name, limits in parameter.ranges().items()}
 
     def children(self) -> dict[str, Any]:
         """Textures and nested BSDFs by name, for ``mi.traverse``."""

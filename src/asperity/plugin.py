@@ -77,7 +77,7 @@ def _bsdf(model_class: Any, variant: str) -> type:
                 return _depolarise(self.model.directional_albedo(si, active))
             return _depolarise(directional_albedo(self.model.sample, si, active, ALBEDO_SAMPLES))
 
-        traverse, parameters_changed, to_string = _traverse, _parameters_changed, _to_string
+        traverse, parameters_changed, to_string, ranges = _traverse, _parameters_changed, _to_string, _ranges
 
     Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
     return Plugin
@@ -110,7 +110,7 @@ def _texture(model_class: Any, variant: str) -> type:
         def is_spatially_varying(self) -> bool:
             return True
 
-        traverse, parameters_changed, to_string = _traverse, _parameters_changed, _to_string
+        traverse, parameters_changed, to_string, ranges = _traverse, _parameters_changed, _to_string, _ranges
 
     Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
     return Plugin
@@ -158,6 +158,11 @@ def _traverse(self: Any, callback: mi.TraversalCallback) -> None:
 def _parameters_changed(self: Any, keys: list[str]) -> None:
     self.model.check()
     self.model.update()
+
+
+def _ranges(self: Any) -> dict[str, tuple[float, float]]:
+    """(least, greatest) by the name of a parameter that ``mi.traverse`` shows, for checks and fits."""
+    return self.model.ranges()
 
 
 def _to_string(self: Any) -> str:

@@ -22,8 +22,8 @@ def gauss_legendre(n: int) -> tuple[list[float], list[float]]:
 
 
 @cache
-def rule(n: int, number: type) -> tuple[Any, Any]:
-    """The nodes and weights as arrays of ``number``, made once."""
+def rule(n: int, number: Any) -> tuple[Any, Any]:
+    """The nodes and weights as arrays of the type ``number``, made once."""
     nodes, weights = gauss_legendre(n)
     return number(nodes), number(weights)
 
@@ -62,7 +62,8 @@ def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, 
     fast as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives
     need the copies.
     """
-    Float, first = type(like), gauss_legendre(n)[0][0]
+    Float: Any = type(like)
+    first = gauss_legendre(n)[0][0]
     if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(Float(first), captured))):
         terms = [[weight * value for value in f(node, captured)] for node, weight in zip(*gauss_legendre(n))]
         return tuple(map(sum, zip(*terms)))

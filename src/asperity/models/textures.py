@@ -7,29 +7,32 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..parameters import Declared, Texture
+from ..parameters import Declared, Direction, Texture
 
 
 class Settled(Declared):
-    """How much has settled on a surface: ``top`` where its normal points up (+z), ``bottom`` where it points down.
+    """How much has settled on a surface: ``top`` where it faces up, ``bottom`` where it faces down.
 
-    Between them, a smooth step of the normal's vertical component around ``threshold`` (Lucas 2024, Fig. 1b).
+    Between them, a smooth step of the normal's component along ``up`` around ``threshold`` (Lucas 2024, Fig. 1b). The
+    side that is seen counts, whatever the winding of its faces. Mitsuba's ``twosided`` does not tell which side that
+    is: give it two BSDFs, the second with the opposite ``up``.
     """
 
     between = ("top", "bottom")
 
     top = Texture("value on upward surfaces", 0.6)
     bottom = Texture("value on downward surfaces", 0.0, unit="")
-    threshold = Texture("vertical component of the normal half way between them", 0.3, low=-1, high=1)
+    up = Direction("where up is", (0, 0, 1))
+    threshold = Texture("component of the normal along up, half way between them", 0.3, low=-1, high=1)
     softness = Texture("half the width of the step, in the same component", 0.6, low=1e-6, high=4)
 
     def eval(self, si: mi.SurfaceInteraction3f, active: Any) -> Any:
-        """Value at a surface point, from its world-space shading normal."""
+        """Value at a surface point, from its world-space shading normal on the side that is seen."""
         top, bottom, threshold, softness = (
             self.number(name, si, active) for name in ("top", "bottom", "threshold", "softness")
         )
-        # The side does not matter to a twosided material seen from below: n is the surface's own outward normal.
-        t = dr.clip((si.sh_frame.n.z - threshold) / softness / 2 + 0.5, 0, 1)
+        facing = dr.mulsign(dr.dot(si.sh_frame.n, mi.Vector3f(*self.up)), si.wi.z)
+        t = dr.clip((facing - threshold) / softness / 2 + 0.5, 0, 1)
         return bottom + (top - bottom) * t * t * (3 - 2 * t)
 
     def mean(self) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import warnings
 from typing import Any
 
 import drjit as dr
@@ -89,6 +89,12 @@ class VGroove(Declared):
                         f"{name} = {high:g}: expected a number or texture in [{SMOOTHEST:g}, 1] for Phong."
                     )
 
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Phong's roughness ends at 1."""
+        largest = DISTRIBUTIONS[self.distribution].largest
+        found = super().ranges()
+        return found | {name: (low, min(high, largest)) for name, (low, high) in found.items() if "alpha" in name}
+
     def components(self) -> list[int]:
         """One glossy lobe."""
         anisotropic = 0 if self.isotropic else mi.BSDFFlags.Anisotropic
@@ -96,8 +102,11 @@ class VGroove(Declared):
 
     def update(self) -> None:
         """Bring up to date what is made from the parameters."""
-        needed = needed_bounces if self.symmetric else needed_bounces_nonsymmetric
-        most = self.max_bounces or needed(DISTRIBUTIONS[self.distribution], self._roughest())
+        needed, alpha = needed_bounces if self.symmetric else needed_bounces_nonsymmetric, self._roughest()
+        most = self.max_bounces or (MOST if alpha is None else needed(DISTRIBUTIONS[self.distribution], alpha))
+        if alpha is not None and not self.max_bounces and most == MOST:
+            lost = f"alpha = {alpha:g}: more than 0.1 % of the light bounces over {MOST} times, and is lost."
+            warnings.warn(lost, stacklevel=2)
         self.most = dr.opaque(mi.UInt32, most) if dr.is_jit_v(mi.Float) else most
         self.logarithm = self._constant_logarithm()
 
@@ -161,17 +170,18 @@ class VGroove(Declared):
     def _profile(self, si, active, cos_azimuth, sin_azimuth) -> Profile:
         return Profile.along(DISTRIBUTIONS[self.distribution], cos_azimuth, sin_azimuth, *self._alphas(si, active))
 
-    def _roughest(self) -> float:
-        """Largest roughness: of the numbers that Mitsuba shows of a texture, else of all that are allowed."""
+    def _roughest(self) -> float | None:
+        """Largest roughness, of the numbers that Mitsuba shows of a texture; None if it shows none."""
+        names = ["exponent"] if self.exponent else self.axes
+        shown = [[found.ravel() for _, found in numbers(getattr(self, name), differentiated=True)] for name in names]
+        if not all(shown):
+            return None
+        alphas = np.concatenate([part for parts in shown for part in parts])
         if self.exponent:
-            return math.sqrt(2 / (self._extremes("exponent")[0] + 2))
-        return min(max(self._extremes(name)[1] for name in self.axes), DISTRIBUTIONS[self.distribution].largest)
-
-    def _extremes(self, name: str) -> tuple[float, float]:
-        declared = getattr(type(self), name)
-        shown = [found.ravel() for _, found in numbers(getattr(self, name), differentiated=True)]
-        found = np.concatenate(shown) if shown else np.array([declared.low, declared.high])
-        return float(max(found.min(), declared.low)), float(min(found.max(), declared.high))
+            alphas = np.sqrt(2 / (np.maximum(alphas, 0) + 2))
+        return float(
+            np.clip(alphas.max(), SMOOTHEST, min(type(self).alpha.high, DISTRIBUTIONS[self.distribution].largest))
+        )
 
     def _metal(self, si, active) -> Metal | None:
         if self.metal.mirror:
