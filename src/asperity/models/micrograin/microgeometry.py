@@ -12,6 +12,8 @@ from ...errors import ParameterError
 from ...goniophotometer.tile import Tile
 
 BLACK = {"type": "diffuse", "reflectance": 0.0}
+MARGIN = 1e-5
+"""From the base to the tile's bottom: of light that a base of glass lets through, hardly any meets a grain below it."""
 COHERENT = 4096
 """Grains in the window through which a batch of rays enters a larger tile: few enough for the processor's cache."""
 
@@ -106,7 +108,7 @@ class ExplicitGrains:
                 "bsdf": self.grain,
             }
         window = np.sqrt(width * depth * min(1, COHERENT / self.grains))
-        return Tile(mi.load_dict(shapes, parallel=False), width, depth, -1e-3, 1 + 1e-3, True, window)
+        return Tile(mi.load_dict(shapes, parallel=False), width, depth, -MARGIN, 1 + MARGIN, True, window)
 
 
 def _tensor(values: np.ndarray) -> mi.TensorXf:
