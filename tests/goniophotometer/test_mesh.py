@@ -1,7 +1,9 @@
 """Meshes and height fields: known answers of flat and white surfaces, one answer for one shape, and mistakes named."""
 
 import asperity  # noqa: F401  isort: skip
+import copy
 import json
+import pickle
 import re
 
 import mitsuba as mi
@@ -102,20 +104,16 @@ def test_a_tile_is_built_once_and_described_in_plain_words(rgb, tmp_path):
     assert Mesh(tmp_path / "flat.ply").description["sha256"] != before["sha256"]
 
 
-@pytest.mark.parametrize("ending", [".npy", ".png", ".exr"])
-def test_heights_are_read_as_stored(rgb, tmp_path, ending):
-    """No sRGB curve: a .png of 16 bits is good to half of 2^-16."""
-    heights, path = np.random.default_rng(0).random((4, 6)), tmp_path / f"heights{ending}"
-    if ending == ".npy":
-        np.save(path, heights)
-    else:
-        image = mi.Bitmap(np.float32(np.stack([heights, 0 * heights, 0 * heights], axis=-1)))
-        if ending == ".png":
-            image = image.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt16, srgb_gamma=False)
-        image.write(str(path))
-    field = HeightField.load(path, 0.1, scale=3)
-    assert np.allclose(field.heights, 3 * heights, atol=3e-5)
-    assert field.description["source"]["path"] == str(path.resolve()) and field.description["source"]["scale"] == 3
+@pytest.mark.parametrize("copied", [lambda geometry: pickle.loads(pickle.dumps(geometry)), copy.copy, copy.deepcopy])
+def test_geometries_travel(rgb, tmp_path, copied):
+    """After use, too: what is made again is left behind. A copy is as read-only as its original."""
+    mesh = Mesh(grid(tmp_path / "waves.ply", closed(waves(8))), WHITE)
+    for geometry in (mesh, HeightField(waves(8), 1 / 8, WHITE, level=True)):
+        before = run(geometry, paths=2**10)
+        twin = copied(geometry)
+        assert twin.description == geometry.description and vars(twin).keys() < vars(geometry).keys()
+        assert np.array_equal(run(twin, paths=2**10).energy, before.energy)
+    assert not twin.heights.flags.writeable
 
 
 def moved(k, point):
@@ -187,6 +185,9 @@ def test_a_bad_file_is_named(rgb, tmp_path, name, content, words):
         ({"heights": [[1, 2], [3]]}, "heights: expected a 2-D array"),
         ({"heights": [[1, 2], [np.inf, np.nan]]}, r"heights\[1, 0\] = inf.*2 are not"),
         ({"heights": [[0, 1], [0, 900]]}, "same unit"),
+        ({"heights": np.ma.masked_less([[1, 2], [3, -9999]], 0)}, r"heights\[1, 1\]: masked.*; 1 of 4 are"),
+        ({"heights": [np.ma.masked_less([2, -9999], 0)] * 2}, r"heights\[0, 1\]: masked.*; 2 of 4 are"),
+        ({"level": "yes"}, "level = 'yes': expected True or False"),
         ({"spacing": 0}, "spacing = 0"),
         ({"spacing": (1, -2)}, r"spacing = \(1, -2\)"),
         ({"spacing": "wide"}, "spacing = 'wide'"),

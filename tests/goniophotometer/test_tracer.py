@@ -56,7 +56,9 @@ def test_a_rough_pane_is_its_bsdf():
 class Varnish:
     """White paint under a layer of rough glass."""
 
-    description = {"type": "varnish"}
+    @property
+    def description(self):
+        return {"type": "varnish"}
 
     def tile(self, rng):
         sides = {
