@@ -50,7 +50,8 @@ class ExplicitGrains:
     def of(cls, model: dict[str, Any], given: set[str]) -> ExplicitGrains:
         """The grains that a ``micrograin`` BSDF models; of its parameters the scene has ``given`` some itself.
 
-        Coated grains are Mitsuba's ``plastic``: with the inner reflections that the model neglects.
+        Coated grains are Mitsuba's ``plastic``, with inner reflections, which the model neglects: for an index of 1.5
+        its diffuse part is 1.10 times the model's, in all directions.
         """
         for name in ("variation", "reflectivity", "edge_tint"):
             if name in given and model[name] != "none":
