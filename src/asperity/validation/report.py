@@ -54,6 +54,10 @@ class Effort(NamedTuple):
     tiles: int
     seed: int = 0
 
+    def at_least(self, paths: float) -> Effort:
+        """As many, or these where fewer would tell nothing."""
+        return self._replace(paths=max(self.paths, paths))
+
 
 def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float) -> Finding:
     """Whether all numbers of a model lie within the truth's standard errors, and a relative ``tolerance`` of its own.

@@ -221,17 +221,12 @@ def all_bounces(claim: str, measured: Measurement, model: np.ndarray, tolerance:
     return [ours, told_apart(f"{claim}: one bounce (Cook-Torrance) is refused", ours, alone)]
 
 
-def enough(effort: Effort) -> Effort:
-    """As many paths as orders need that are counted apart."""
-    return effort._replace(paths=max(effort.paths, ENOUGH))
-
-
 def brdf_by_bounce(effort: Effort) -> Section:
     """Fig. 11: the symmetric BRDF, bounce by bounce."""
     findings, pictures, thetas = [], {}, (0.0, 20.0, 40.0, 60.0, 80.0)
     for alpha in ALPHAS:
         description = grooves(alpha)
-        measured = shoot(description, [(theta, 0.0) for theta in thetas], enough(effort), apart=4)
+        measured = shoot(description, [(theta, 0.0) for theta in thetas], effort.at_least(ENOUGH), apart=4)
         model = by_bounce(description, measured, 4)
         findings += compared(f"α {alpha:g}", measured, model, FLOAT32)
         findings += all_bounces(f"α {alpha:g}", measured, model, FLOAT32)
@@ -271,7 +266,7 @@ def nonsymmetric(effort: Effort) -> Section:
     """Non-symmetric grooves, other distributions and anisotropy, which the paper shows in its supplement."""
     findings = []
     for name, description in OTHERS.items():
-        measured = shoot(description, [(20.0, 40.0), (60.0, 250.0)], enough(effort), apart=3)
+        measured = shoot(description, [(20.0, 40.0), (60.0, 250.0)], effort.at_least(ENOUGH), apart=3)
         tolerance = QUADRATURE if description.get("symmetric") is False else FLOAT32
         tolerance += 2e-3 * ("material" in description)  # the closed product of reflectances (`fresnel`)
         findings += compared(name, measured, by_bounce(description, measured, 3), tolerance)
