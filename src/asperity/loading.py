@@ -1,0 +1,331 @@
+"""Descriptions on their way into Mitsuba: checked before it sees them, and its complaints made short.
+
+Some mistakes kill Mitsuba 3.9 (a ``bitmap`` without a file, a value that is None, a mesh with indices out of range),
+make it wait for ever (filters of a million pixels), or pass in silence (NaN, a ``measured`` file cut in half). `load`
+and `load_file` stand in for ``mi.load_dict`` and ``mi.load_file``: what is wrong with a description is a
+ParameterError of one line, which says where.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import AsperityError, ParameterError, UnreadableFileError, suggestion
+
+DEEPEST = 64
+"""Descriptions nested in each other; Mitsuba's time grows with the square of it."""
+
+SOURCES = {
+    "bitmap": ("filename", "bitmap", "data"),
+    "envmap": ("filename", "bitmap"),
+    "gridvolume": ("filename", "grid", "data"),
+    "sdfgrid": ("filename", "grid"),
+    **dict.fromkeys(
+        ("measured", "measured_polarized", "ply", "obj", "serialized", "bsplinecurve", "linearcurve"), ("filename",)
+    ),
+}
+"""What a plugin reads: one of these has to be given."""
+
+BITMAP = (*SOURCES["bitmap"], "filter_type", "wrap_mode", "format", "raw", "to_uv", "accel", "id")
+"""All parameters of a ``bitmap``, which dies before it would complain of others."""
+
+LIMITS = (
+    ("gaussian", "stddev", 0.01, 32.0),
+    ("tent", "radius", 0.01, 32.0),
+    ("lanczos", "lobes", 1, 32),
+    *((film, side, 1, 2**16) for film in ("hdrfilm", "specfilm") for side in ("width", "height")),
+    *(
+        (name, "sample_count", 1, 2**31)
+        for name in ("independent", "multijitter", "orthogonal", "ldsampler", "stratified")
+    ),
+)
+"""Ranges outside which Mitsuba crashes, hangs, or renders nothing."""
+
+BLEND = {"type", "id", "weight"}
+MESHES = ("ply", "obj", "serialized")
+TENSORS = ("bsdf", "pbsdf")
+EIGHT_BITS = (".png", ".jpg", ".jpeg", ".bmp", ".tga")
+"""Images whose texels are within [0, 1] in any case."""
+
+REFLECTANCE = re.compile("reflect|albedo|base_color|edge_tint")
+"""Parameters within [0, 1]: Mitsuba clips their spectra in RGB variants."""
+
+TRACEBACK = "Traceback (most recent call last):\n"
+NOISE = {
+    r"\[parser\.cpp:\d+\] \[(?!\w+\.cpp)([\w.]+)\] ": r"\1: ",
+    r"\[\w+(?:\.\w+:\d+)?\] ": "",
+    r'(?:At|While loading) dictionary node "root": ': "",
+    r'(?:At|While loading|Error while loading) dictionary node "(.*?)": ': r"\1: ",
+    r'failed to instantiate \w+ plugin of type ".*?": ': "",
+    r'Found \d+ unreferenced \w+ in \w+ plugin of type "(.*?)":\s+- \w+ "(.*?)".*': r"\1 has no parameter '\2'.",
+    r"could not assign an object of type '(.*?)' to key .*": r"expected a number, a word, three numbers, "
+    r"a transformation or a description, not a '\1'.",
+}
+"""In Mitsuba's messages, and what to say instead."""
+
+
+def load(description: dict[str, Any]) -> Any:
+    """The object of the current variant that a dictionary describes; raises ParameterError."""
+    import mitsuba as mi
+
+    check(description)
+    with _refusing():
+        return mi.load_dict(description, parallel=False)
+
+
+def load_file(path: str | Path, **defines: str) -> Any:
+    """What an XML file describes, each ``$name`` in it replaced as ``defines`` says; raises ParameterError."""
+    import mitsuba as mi
+
+    with _refusing():
+        state = mi.parser.parse_file(mi.parser.ParserConfig(mi.variant()), str(path), **defines)
+        for node in state.nodes:
+            properties = {key: node.props[key] for key in node.props.keys()}  # noqa: SIM118  (it is no dict)
+            where = f"{mi.parser.file_location(state, node)}: "
+            for key, value in properties.items():
+                _value(value, where + key, bool(REFLECTANCE.search(key)))
+            _node({"type": node.props.plugin_name(), **properties}, where, Path(path).parent)
+        return mi.load_file(str(path), parallel=False, **defines)
+
+
+def mesh(path: Path, **options: Any) -> Any:
+    """The ``mi.Mesh`` in a file, after a look at its indices; raises UnreadableFileError.
+
+    ``options`` are parameters of Mitsuba's plugin.
+    """
+    import mitsuba as mi
+
+    description = {"type": path.suffix.lower()[1:], "filename": str(path), **options}
+    try:
+        # Normals would be made of vertices that may not exist.
+        flat = mi.traverse(mi.load_dict(description | {"face_normals": True}, parallel=False))
+        vertices, faces = (np.array(flat[name]).reshape(-1, 3) for name in ("vertex_positions", "faces"))
+        if not len(faces):
+            raise _damaged("mesh", path, MESHES, "it has no faces")
+        if len(wild := np.flatnonzero(faces.max(axis=1) >= len(vertices))):
+            indices, end = faces[wild[0]].tolist(), f"and there are {len(vertices)}; both count from 0"
+            raise _damaged("mesh", path, MESHES, f"face {wild[0]} is of vertices {indices}, {end}")
+        return mi.load_dict(description, parallel=False)
+    except (RuntimeError, UnicodeDecodeError) as error:
+        raise _damaged("mesh", path, MESHES, one_line(str(error))) from error
+
+
+def check(description: Any) -> None:
+    """Raise ParameterError, with the dotted path, for what Mitsuba would die of or take in silence.
+
+    Meshes and images, which only Mitsuba can read, are looked at once a variant is set.
+    """
+    _walk(description, "", (), False)
+
+
+def one_line(message: str) -> str:
+    """Mitsuba's message without what only its authors need: C++ files, plugin kinds, tracebacks of our models."""
+    head, traceback, tail = message.rpartition(TRACEBACK)
+    text = head + re.sub(r"\A(?:\s.*\n)*(?:[\w.]+: )?", "", tail) if traceback else tail
+    for noise, instead in NOISE.items():
+        text = re.sub(noise, instead, text, flags=re.DOTALL)
+    text = re.sub(r'Plugin "(.*?)" not found!', lambda plugin: no_plugin(plugin[1]), text)
+    return " ".join(text.split())
+
+
+def no_plugin(name: str) -> str:
+    """What to say about a plugin that nobody has."""
+    import mitsuba as mi
+
+    from .models import MODELS, PHASES, TEXTURES
+
+    mitsubas = (path.stem.removeprefix("lib") for path in (Path(mi.__file__).parent / "plugins").iterdir())
+    nearest = get_close_matches(name, [*MODELS, *TEXTURES, *PHASES, *mitsubas], n=1)
+    return f"there is no plugin {name!r}." + (f" Did you mean {nearest[0]!r}?" if nearest else "")
+
+
+@contextlib.contextmanager
+def _refusing() -> Iterator[None]:
+    """Mitsuba's errors as ParameterErrors; but what went wrong in a plugin in Python, and is no refusal, is a bug."""
+    try:
+        yield
+    except (RuntimeError, UnicodeDecodeError) as error:
+        _, traceback, tail = str(error).rpartition(TRACEBACK)
+        raised = re.search(r"^(?:\w+\.)*(\w+)(?:: |$)", tail, re.MULTILINE)
+        refusals = {"RuntimeError", *(kind.__name__ for kind in AsperityError.__subclasses__())}
+        if traceback and raised and raised[1] not in refusals:
+            raise
+        raise ParameterError(one_line(str(error))) from error
+
+
+def _short(value: Any) -> str:
+    if not isinstance(value, (str, int, float, list, tuple, dict, type(None))):
+        return f"a {type(value).__name__}"
+    text = "null" if value is None else " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _walk(node: Any, where: str, above: tuple[Any, ...], reflectance: bool) -> None:
+    """Check a description and those nested in it; ``where`` leads to it, ``reflectance`` tells whether it is one."""
+    if not isinstance(node, dict):
+        raise ParameterError(f"{where}{_short(node)}: expected a description, such as {{'type': 'diffuse'}}.")
+    if any(node is outer for outer in above) or len(above) > DEEPEST:
+        raise ParameterError(f"{where[:60]}... is nested more than {DEEPEST} deep, or in itself.")
+    for key, value in node.items():
+        if not isinstance(key, str):
+            raise ParameterError(f"{where}{key!r}: expected a word as the name of a parameter.")
+        colour = reflectance or bool(REFLECTANCE.search(key))
+        if isinstance(value, dict):
+            _walk(value, f"{where}{key}.", (*above, node), colour)
+        elif key not in ("type", "id", "filename") and not (node.get("type") in ("rgb", "spectrum") and key == "value"):
+            _value(value, where + key, colour)
+    _node(node, where)
+    _spectrum(node, where, reflectance)
+
+
+def _value(value: Any, name: str, reflectance: bool) -> None:
+    """Refuse what is no value, or not finite."""
+    import drjit as dr
+
+    if value is None:
+        raise ParameterError(f"{name} is null: leave it out for its default.")
+    if isinstance(value, (list, tuple)):
+        if _finite(value, name, "three numbers").shape != (3,):
+            raise ParameterError(f"{name} = {_short(value)}: expected three numbers.")
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        _finite(value, name, "a number")
+    elif "Transform" in type(value).__name__:
+        matrix = _finite(value.matrix, name, "a matrix")
+        if matrix.ndim == 2 and np.linalg.det(matrix) == 0:
+            raise ParameterError(f"{name} has no inverse: it flattens what it transforms.")
+    elif isinstance(value, np.ndarray) or dr.is_array_v(value):
+        if not _finite(value, name, "numbers").size:
+            raise ParameterError(f"{name} is empty.")
+    elif hasattr(value, "wavelengths") and reflectance and not value.is_uniform():  # a spectrum in XML
+        _within_unit(np.array(value.values), name, "a reflectance")
+
+
+def _finite(value: Any, name: str, expected: str) -> NDArray[np.float64]:
+    import drjit as dr
+
+    try:
+        found = np.array(dr.detach(value), dtype=np.float64)
+    except (TypeError, ValueError, OverflowError, RuntimeError):
+        found = np.array(np.nan)
+    if not np.isfinite(found).all():
+        raise ParameterError(f"{name} = {_short(value)}: expected {expected}, finite.")
+    return found
+
+
+def _within_unit(values: NDArray[Any], name: str, what: str) -> None:
+    wrong = values[~((values >= 0) & (values <= 1))]
+    if wrong.size:
+        raise ParameterError(f"{name} has {wrong.flat[0]:g}: {what} is within [0, 1].")
+
+
+def _node(given: dict[str, Any], where: str, folder: Path = Path()) -> None:
+    """Check what a plugin needs; its files are in ``folder``, or where Mitsuba looks for them."""
+    if "type" not in given:
+        raise ParameterError(f"{where}type is missing: expected the name of a plugin.")
+    for name in {"type", "id"} & given.keys():
+        if not isinstance(given[name], str):
+            raise ParameterError(f"{where}{name} = {_short(given[name])}: expected a name.")
+    plugin = given["type"]
+    if plugin == "bitmap":
+        for name in sorted(given.keys() - {"type", *BITMAP}):
+            raise ParameterError(f"{where}{name}: a bitmap has no such parameter. {suggestion(name, BITMAP)}")
+    if plugin in SOURCES and given.keys().isdisjoint(SOURCES[plugin]):
+        raise ParameterError(f"{where}{SOURCES[plugin][0]} is missing: {plugin} needs {' or '.join(SOURCES[plugin])}.")
+    if plugin in ("blendbsdf", "blendphase") and ("weight" not in given or len(given.keys() - BLEND) != 2):
+        raise ParameterError(f"{where}type is {plugin!r}: expected two nested descriptions, and a weight.")
+    for limited, name, low, high in LIMITS:
+        value = given.get(name, low)
+        if plugin == limited and isinstance(value, (int, float)) and not low <= value <= high:
+            raise ParameterError(f"{where}{name} = {value}: expected a number in [{low}, {high}].")
+    if "filename" in given:
+        _file(given, f"{where}filename", folder)
+    for name in ("bitmap", "data"):
+        if plugin in ("bitmap", "envmap") and name in given:
+            _texels(given, np.array(given[name]), where + name)
+
+
+def _file(given: dict[str, Any], name: str, folder: Path) -> None:
+    """Find a file, and look into it where Mitsuba does not, or would die of what it finds."""
+    import mitsuba as mi
+
+    plugin, filename = given["type"], given["filename"]
+    if not isinstance(filename, str):
+        raise ParameterError(f"{name} = {_short(filename)}: expected the path of a file, as a string.")
+    places = (folder / filename, Path(str(mi.file_resolver().resolve(filename))))
+    path = next((path for path in places if path.is_file()), None)
+    if path is None:
+        raise ParameterError(f"{name}: there is no file {filename!r}.")
+    try:
+        if plugin in ("measured", "measured_polarized"):
+            _tensors(path)
+        elif mi.variant() and plugin in MESHES:
+            mesh(path, **{key: given[key] for key in ("shape_index",) if key in given})
+        elif mi.variant() and plugin in ("bitmap", "envmap") and path.suffix.lower() not in EIGHT_BITS:
+            _texels(given, np.array(mi.Bitmap(str(path))), name)
+    except UnreadableFileError as error:
+        raise ParameterError(f"{name}: {error}") from error
+    except RuntimeError as error:
+        raise ParameterError(f"{name}: {one_line(str(error))}") from error
+
+
+def _tensors(path: Path) -> None:
+    """Refuse a file of tensors that is not all there: Mitsuba would take what lies beyond its end in memory."""
+    from mitsuba.python import tensor_io
+
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            fields = tensor_io.read(str(path))
+    except Exception as error:  # it checks little: anything may go wrong in a damaged file
+        raise _damaged("measurement", path, TENSORS, f"it is cut short, or damaged ({error})") from error
+    for name, data in fields.items():
+        if data.dtype.kind == "f" and not np.isfinite(data).all():
+            raise _damaged("measurement", path, TENSORS, f"its {name!r} is not finite")
+        if name in ("ndf", "sigma", "vndf", "luminance") and (data < 0).any():
+            raise _damaged("measurement", path, TENSORS, f"its {name!r} is below 0")
+        if name in ("theta_i", "phi_i", "wavelengths") and (np.diff(data) <= 0).any():
+            raise _damaged("measurement", path, TENSORS, f"its {name!r} does not increase")
+
+
+def _damaged(what: str, path: Path, formats: Iterable[str], reason: str) -> UnreadableFileError:
+    return UnreadableFileError(what, path, [f".{name}" for name in formats], reason)
+
+
+def _texels(given: dict[str, Any], image: NDArray[Any], name: str) -> None:
+    """Refuse texels that are not finite, or that Mitsuba clips."""
+    import mitsuba as mi
+
+    if image.dtype.kind != "f":
+        return
+    if wrong := np.count_nonzero(~np.isfinite(image)):
+        raise ParameterError(f"{name}: {wrong} of its {image.size} numbers are not finite.")
+    # In spectral variants a texel becomes three coefficients, which have no range that could be checked later.
+    coloured = given["type"] == "bitmap" and not given.get("raw") and image.shape[-1:] > (2,)
+    if coloured and mi.variant() and mi.is_spectral:
+        _within_unit(image, name, "a colour, in spectral variants,")
+
+
+def _spectrum(given: dict[str, Any], where: str, reflectance: bool) -> None:
+    """Check a colour, or a spectrum in the ways in which it can be given."""
+    plugin = given["type"]
+    if plugin in ("rgb", "spectrum") and "value" in given:
+        name, expected = f"{where}value", "one number or three" if plugin == "rgb" else "pairs of wavelength and value"
+        values = _finite(given["value"], name, expected)
+        if values.ndim and (values.shape != (3,) if plugin == "rgb" else values.shape != (len(values), 2)):
+            raise ParameterError(f"{name} = {_short(given['value'])}: expected {expected}.")
+        if reflectance and values.ndim == 2:
+            _within_unit(values[:, 1], name, "a reflectance")
+    elif plugin in ("irregular", "regular") and isinstance(given.get("values"), str):
+        name = f"{where}values"
+        values = _finite(re.findall(r"[^\s,]+", given["values"]), name, "numbers")
+        if reflectance:
+            _within_unit(values, name, "a reflectance")
