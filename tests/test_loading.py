@@ -95,6 +95,7 @@ def test_ways_to_give_a_colour_pass(good):
         ({"type": "bitmap", "filename": "/dev/zero"}, "reflectance.filename: there is no file"),
         ({"type": "bitmap", "data": scalar.TensorXf(np.zeros((0, 2, 3)))}, "reflectance.data is empty"),
         ({"type": "bitmap", "data": None}, "reflectance.data is null"),
+        ({"type": "checkerboard", "to_uv": scalar.Matrix3f64(0)}, "reflectance.to_uv has no inverse"),
     ],
 )
 def test_bad_values_are_named_by_their_path(bad, words):

@@ -199,9 +199,10 @@ def _value(value: Any, name: str, reflectance: bool) -> None:
             raise ParameterError(f"{name} = {_short(value)}: expected three numbers.")
     elif isinstance(value, Real) and not isinstance(value, bool):
         _finite(value, name, "a number")
-    elif "Transform" in type(value).__name__:
-        matrix = _finite(value.matrix, name, "a matrix")
-        if matrix.ndim == 2 and np.linalg.det(matrix) == 0:
+    elif re.search("Transform|Matrix", type(value).__name__):
+        # Row by row: NumPy sees the padding of Dr.Jit's scalar 3x3 matrices.
+        matrix = _finite([list(row) for row in getattr(value, "matrix", value)], name, "a matrix")
+        if np.linalg.det(matrix.reshape(matrix.shape[:2])) == 0:
             raise ParameterError(f"{name} has no inverse: it flattens what it transforms.")
     elif isinstance(value, np.ndarray) or dr.is_array_v(value):
         if not _finite(value, name, "numbers").size:
