@@ -80,7 +80,10 @@ def test_ways_to_give_a_colour_pass(good):
         ({"type": "uniform", "value": None}, "reflectance.value is null"),
         ({"type": "spectrum", "value": []}, "reflectance.value = ..: expected pairs"),
         ({"type": "spectrum", "value": [(400, 0.5), (700, 3)]}, "reflectance.value has 3: a reflectance is within"),
-        ({"type": "irregular", "wavelengths": "400, 500, 700", "values": ".1, -2, .3"}, "reflectance.values has -2"),
+        (
+            {"type": "irregular", "wavelengths": "400, 700", "values": ".1, .2"},
+            "reflectance.type is 'irregular', which",
+        ),
         (
             {"type": "checkerboard", "color0": PAIRS, "color1": {**PAIRS, "value": [(400, 7), (700, 0)]}},
             "reflectance.color1.value has 7",
@@ -101,6 +104,15 @@ def test_ways_to_give_a_colour_pass(good):
 def test_bad_values_are_named_by_their_path(bad, words):
     with pytest.raises(ParameterError, match=rf"^bsdf\.{words}"):
         loading.load(textured(bad))
+
+
+@pytest.mark.parametrize("plugin", ["irregular", "regular"])
+@pytest.mark.parametrize("values", ["0.1, -2, 0.3", "0.1 7 0.3", "0.1, 0.2, nan"])
+def test_spectra_of_reflectances_are_within_range(plugin, values):
+    mi.set_variant("scalar_spectral")
+    range_ = {"irregular": {"wavelengths": "400, 500, 700"}, "regular": {"wavelength_min": 400, "wavelength_max": 700}}
+    with pytest.raises(ParameterError, match=r"^bsdf.reflectance.values (has (-2|7): a reflectance is|.*nan.*finite)"):
+        loading.load(textured({"type": plugin, "values": values, **range_[plugin]}))
 
 
 @pytest.mark.parametrize(
@@ -217,6 +229,52 @@ def test_meshes_are_looked_at_before_use(tmp_path, vertices, faces, words, face_
 
 def test_good_meshes_pass(tmp_path):
     assert loading.mesh(ply(tmp_path, TRIANGLE, [(0, 1, 2)])).face_count() == 1
+
+
+def test_a_serialized_mesh_declares_no_more_than_it_holds(tmp_path):
+    import struct
+    import zlib
+
+    table = struct.pack("<I", 0x1001) + b"name\0" + struct.pack("<QQ", 1 << 33, 1) + bytes(36)
+    path = tmp_path / "x.serialized"
+    path.write_bytes(struct.pack("<HH", 0x041C, 4) + zlib.compress(table) + struct.pack("<QI", 0, 1))
+    with pytest.raises(UnreadableFileError, match="it declares 8589934592 vertices and 1 faces, and ends before"):
+        loading.mesh(path)
+    for cut in range(0, path.stat().st_size, 7):
+        (short := tmp_path / "short.serialized").write_bytes(path.read_bytes()[:cut])
+        with pytest.raises(UnreadableFileError):
+            loading.mesh(short)
+
+
+def radiance(rows, size=(2, 8)):
+    return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % size + b"".join(rows)
+
+
+ROW = bytes((2, 2, 0, 8)) + bytes((136, 100)) * 3 + bytes((8, *[129] * 8))
+
+
+@pytest.mark.parametrize("rows", [[ROW, ROW], [bytes((100, 100, 100, 129)) * 16]])
+def test_radiance_pictures_are_read_packed_or_not(tmp_path, rows):
+    (path := tmp_path / "x.hdr").write_bytes(radiance(rows))
+    assert np.array(loading.image(path)) == pytest.approx(100 / 128, rel=0.01)  # of 8 bits
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([ROW], "row 1 does not begin as"),
+        ([ROW, ROW[:-1]], "cut short"),
+        ([bytes(63)], "cut short"),
+        ([ROW, bytes(4 * 8)], "row 1 does not begin as"),  # Mitsuba writes a whole picture from there
+        ([ROW, bytes((2, 2, 0, 9)) + ROW[4:]], "row 1 does not begin as"),
+        ([ROW, ROW[:4] + bytes((137, 100)) + ROW[6:]], "runs of row 1 are longer"),
+        ([ROW, ROW[:4] + bytes((0, 100)) + ROW[6:]], "runs of row 1 are longer"),
+    ],
+)
+def test_damaged_radiance_pictures_are_refused(tmp_path, rows, words):
+    (path := tmp_path / "x.hdr").write_bytes(radiance(rows))
+    with pytest.raises(UnreadableFileError, match=words):
+        loading.image(path)
 
 
 @pytest.fixture

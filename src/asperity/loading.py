@@ -11,6 +11,8 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import struct
+import zlib
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from numbers import Real
@@ -52,6 +54,7 @@ LIMITS = (
 """Ranges outside which Mitsuba crashes, hangs, or renders nothing."""
 
 BLEND = {"type", "id", "weight"}
+IMAGES = ("exr", "hdr", "pfm", "png", "jpg", "bmp", "tga")
 MESHES = ("ply", "obj", "serialized")
 TENSORS = ("bsdf", "pbsdf")
 EIGHT_BITS = (".png", ".jpg", ".jpeg", ".bmp", ".tga")
@@ -107,6 +110,8 @@ def mesh(path: Path, **options: Any) -> Any:
 
     description = {"type": path.suffix.lower()[1:], "filename": str(path), **options}
     try:
+        if path.suffix.lower() == ".serialized":
+            serialized_flags(path.read_bytes(), options.get("shape_index", 0))
         # Normals would be made of vertices that may not exist.
         flat = mi.traverse(mi.load_dict(description | {"face_normals": True}, parallel=False))
         vertices, faces = (np.array(flat[name]).reshape(-1, 3) for name in ("vertex_positions", "faces"))
@@ -116,8 +121,73 @@ def mesh(path: Path, **options: Any) -> Any:
             indices, end = faces[wild[0]].tolist(), f"and there are {len(vertices)}; both count from 0"
             raise _damaged("mesh", path, MESHES, f"face {wild[0]} is of vertices {indices}, {end}")
         return mi.load_dict(description, parallel=False)
-    except (RuntimeError, UnicodeDecodeError) as error:
-        raise _damaged("mesh", path, MESHES, one_line(str(error))) from error
+    except (RuntimeError, MemoryError, UnicodeDecodeError, struct.error, zlib.error) as error:
+        raise _damaged("mesh", path, MESHES, one_line(str(error)) or "it is too large for the memory") from error
+
+
+def serialized_flags(content: bytes, index: int = 0) -> int:
+    """Flags of a mesh in Mitsuba's own format: 1 for normals. Raises RuntimeError if it declares more than it holds.
+
+    Mitsuba would ask for the memory. The format: per mesh 0x041C, a version, and, compressed, flags, a name (from
+    version 4 on), numbers of vertices and faces, and arrays; at the end of the file where the meshes begin, and how
+    many they are.
+    """
+    (version,), (meshes,) = struct.unpack("<H", content[2:4]), struct.unpack("<I", content[-4:])
+    offset = "<Q" if version > 3 else "<I"
+    table = len(content) - 4 - struct.calcsize(offset) * (meshes - index)
+    if not 0 <= index < meshes <= len(content) or table < 0:
+        raise RuntimeError(f"it has {meshes} meshes, and none of index {index}")
+    (start,) = struct.unpack_from(offset, content, table)
+    arrays = zlib.decompressobj().decompress(content[start + 4 :])
+    after_name = arrays[4:].partition(b"\0")[2] if version > 3 else arrays[4:]
+    flags, vertices, faces = *struct.unpack_from("<I", arrays), *struct.unpack_from("<QQ", after_name)
+    if 12 * max(vertices, faces) > len(arrays):
+        raise RuntimeError(f"it declares {vertices} vertices and {faces} faces, and ends before")
+    return int(flags)
+
+
+def image(path: Path) -> Any:
+    """The ``mi.Bitmap`` in a file, after a look at what Mitsuba trusts; raises UnreadableFileError."""
+    import mitsuba as mi
+
+    try:
+        if path.suffix.lower() in (".hdr", ".rgbe"):
+            _runs(path.read_bytes())
+        return mi.Bitmap(str(path))
+    except (RuntimeError, ValueError, IndexError, MemoryError) as error:
+        reason = "it is cut short, or damaged" if isinstance(error, (IndexError, MemoryError)) else one_line(str(error))
+        raise _damaged("image", path, IMAGES, reason) from error
+
+
+def _runs(content: bytes) -> None:
+    """Follow the run lengths of a Radiance picture: Mitsuba writes beyond its memory if the mark of a row is damaged.
+
+    G. Ward, Real Pixels, 1991: each row is the mark (2, 2, width), and four channels of runs (128 + n, value) and
+    literals (n, values...); or no row has a mark, and a pixel is four bytes.
+    """
+    size = re.match(rb"#\?.*?\n\n-Y (\d{1,5}) \+X (\d{1,5})\n", content, re.DOTALL)
+    if size is None:
+        raise ValueError("it is no Radiance picture whose first pixel is the upper left one")
+    height, width, at = int(size[1]), int(size[2]), size.end()
+    mark = bytes((2, 2, *divmod(width, 256))) if 8 <= width < 32768 else None
+    if content[at : at + 4] != mark and content[at : at + 2] != b"\2\2":
+        if len(content) < at + 4 * width * height:
+            raise IndexError
+        return
+    for row in range(height):
+        if content[at : at + 4] != mark:
+            raise ValueError(f"row {row} does not begin as the one before it")
+        at += 4
+        for _ in range(4):
+            done = 0
+            while done < width:
+                length = content[at] - 128 if content[at] > 128 else content[at]
+                at += 2 if content[at] > 128 else 1 + length
+                done += length
+                if not length or done > width:
+                    raise ValueError(f"the runs of row {row} are longer than the row")
+    if len(content) < at:
+        raise IndexError
 
 
 def check(description: Any) -> None:
@@ -163,17 +233,18 @@ def _refusing() -> Iterator[None]:
         raise ParameterError(one_line(str(error))) from error
 
 
-def _short(value: Any) -> str:
+def short(value: Any, length: int = 60) -> str:
+    """One line that tells what a value is."""
     if not isinstance(value, (str, int, float, list, tuple, dict, type(None))):
         return f"a {type(value).__name__}"
     text = "null" if value is None else " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
 def _walk(node: Any, where: str, above: tuple[Any, ...], reflectance: bool) -> None:
     """Check a description and those nested in it; ``where`` leads to it, ``reflectance`` tells whether it is one."""
     if not isinstance(node, dict):
-        raise ParameterError(f"{where}{_short(node)}: expected a description, such as {{'type': 'diffuse'}}.")
+        raise ParameterError(f"{where}{short(node)}: expected a description, such as {{'type': 'diffuse'}}.")
     if any(node is outer for outer in above) or len(above) > DEEPEST:
         raise ParameterError(f"{where[:60]}... is nested more than {DEEPEST} deep, or in itself.")
     for key, value in node.items():
@@ -196,7 +267,7 @@ def _value(value: Any, name: str, reflectance: bool) -> None:
         raise ParameterError(f"{name} is null: leave it out for its default.")
     if isinstance(value, (list, tuple)):
         if _finite(value, name, "three numbers").shape != (3,):
-            raise ParameterError(f"{name} = {_short(value)}: expected three numbers.")
+            raise ParameterError(f"{name} = {short(value)}: expected three numbers.")
     elif isinstance(value, Real) and not isinstance(value, bool):
         _finite(value, name, "a number")
     elif re.search("Transform|Matrix", type(value).__name__):
@@ -219,7 +290,7 @@ def _finite(value: Any, name: str, expected: str) -> NDArray[np.float64]:
     except (TypeError, ValueError, OverflowError, RuntimeError):
         found = np.array(np.nan)
     if not np.isfinite(found).all():
-        raise ParameterError(f"{name} = {_short(value)}: expected {expected}, finite.")
+        raise ParameterError(f"{name} = {short(value)}: expected {expected}, finite.")
     return found
 
 
@@ -235,7 +306,7 @@ def _node(given: dict[str, Any], where: str, folder: Path = Path()) -> None:
         raise ParameterError(f"{where}type is missing: expected the name of a plugin.")
     for name in {"type", "id"} & given.keys():
         if not isinstance(given[name], str):
-            raise ParameterError(f"{where}{name} = {_short(given[name])}: expected a name.")
+            raise ParameterError(f"{where}{name} = {short(given[name])}: expected a name.")
     plugin = given["type"]
     if plugin == "bitmap":
         for name in sorted(given.keys() - {"type", *BITMAP}):
@@ -261,7 +332,7 @@ def _file(given: dict[str, Any], name: str, folder: Path) -> None:
 
     plugin, filename = given["type"], given["filename"]
     if not isinstance(filename, str):
-        raise ParameterError(f"{name} = {_short(filename)}: expected the path of a file, as a string.")
+        raise ParameterError(f"{name} = {short(filename)}: expected the path of a file, as a string.")
     places = (folder / filename, Path(str(mi.file_resolver().resolve(filename))))
     path = next((path for path in places if path.is_file()), None)
     if path is None:
@@ -272,11 +343,9 @@ def _file(given: dict[str, Any], name: str, folder: Path) -> None:
         elif mi.variant() and plugin in MESHES:
             mesh(path, **{key: given[key] for key in ("shape_index",) if key in given})
         elif mi.variant() and plugin in ("bitmap", "envmap") and path.suffix.lower() not in EIGHT_BITS:
-            _texels(given, np.array(mi.Bitmap(str(path))), name)
+            _texels(given, np.array(image(path)), name)
     except UnreadableFileError as error:
         raise ParameterError(f"{name}: {error}") from error
-    except RuntimeError as error:
-        raise ParameterError(f"{name}: {one_line(str(error))}") from error
 
 
 def _tensors(path: Path) -> None:
@@ -322,11 +391,16 @@ def _spectrum(given: dict[str, Any], where: str, reflectance: bool) -> None:
         name, expected = f"{where}value", "one number or three" if plugin == "rgb" else "pairs of wavelength and value"
         values = _finite(given["value"], name, expected)
         if values.ndim and (values.shape != (3,) if plugin == "rgb" else values.shape != (len(values), 2)):
-            raise ParameterError(f"{name} = {_short(given['value'])}: expected {expected}.")
+            raise ParameterError(f"{name} = {short(given['value'])}: expected {expected}.")
         if reflectance and values.ndim == 2:
             _within_unit(values[:, 1], name, "a reflectance")
     elif plugin in ("irregular", "regular") and isinstance(given.get("values"), str):
+        import mitsuba as mi
+
         name = f"{where}values"
+        if mi.variant() and not mi.is_spectral:  # it would load, and fail when it is first looked at
+            spectrum = "{'type': 'spectrum', 'value': [(400, 0.1), ...]}"
+            raise ParameterError(f"{where}type is {plugin!r}, which is for spectral variants: expected {spectrum}.")
         values = _finite(re.findall(r"[^\s,]+", given["values"]), name, "numbers")
         if reflectance:
             _within_unit(values, name, "a reflectance")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import warnings
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -142,14 +141,13 @@ def _read(path: Path) -> Content:
 
 def _has_normals(path: Path) -> bool:
     """Whether a file brings normals; where it does not, Mitsuba makes some, and does not tell."""
+    if path.suffix.lower() == ".serialized":
+        return loading.serialized_flags(path.read_bytes()) & 1 == 1
     with path.open("rb") as file:
         if path.suffix.lower() == ".obj":
             return any(line.startswith(b"vn") for line in file)
-        start = file.read(1 << 16)
-    if path.suffix.lower() == ".ply":
-        return re.search(rb"\sproperty \w+ nx\s", start.partition(b"end_header")[0]) is not None
-    flags = zlib.decompressobj().decompress(start[4:], 4)  # after the identifier and the version
-    return bool(int.from_bytes(flags, "little") & 1)
+        header = file.read(1 << 16).partition(b"end_header")[0]
+        return re.search(rb"\sproperty \w+ nx\s", header) is not None
 
 
 def area_vectors(vertices: Array, faces: NDArray[np.uint32]) -> Array:

@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity import loading
 from asperity.errors import ParameterError, UnknownNameError, UnreadableFileError, readable
 from asperity.scenes import meshes
 from asperity.scenes.objects import OBJECTS
@@ -139,8 +140,9 @@ def read_map(path: Path) -> Map:
     """Radiance (height, width, 3) of an environment map in longitude and latitude."""
     what = "environment map"
     readable(what, path, MAP_FORMATS)
+    bitmap = loading.image(path)
     try:
-        bitmap = mi.Bitmap(str(path)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
+        bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
     except RuntimeError as error:
         raise UnreadableFileError(what, path, MAP_FORMATS, str(error)) from error
     radiance = np.maximum(np.array(bitmap), 0)  # filters that resize maps ring below zero
