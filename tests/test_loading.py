@@ -277,6 +277,19 @@ def test_damaged_radiance_pictures_are_refused(tmp_path, rows, words):
         loading.image(path)
 
 
+@pytest.mark.parametrize("corner", [(7, 905969671), (2**31 - 1, 7), (-3, 7)])
+def test_a_picture_has_no_more_rows_than_its_file(tmp_path, corner):
+    import struct
+
+    path = tmp_path / "x.exr"
+    mi.Bitmap(np.ones((8, 8, 3), np.float32)).write(str(path))
+    assert loading.image(path).width() == 8
+    window = struct.pack("<4i", 0, 0, 7, 7)
+    path.write_bytes(path.read_bytes().replace(window, struct.pack("<4i", 0, 0, *corner), 1))
+    with pytest.raises(UnreadableFileError, match="pixels do not fit into its"):
+        loading.image(path)
+
+
 @pytest.fixture
 def tensors(tmp_path):
     from mitsuba.python import tensor_io

@@ -153,10 +153,24 @@ def image(path: Path) -> Any:
     try:
         if path.suffix.lower() in (".hdr", ".rgbe"):
             _runs(path.read_bytes())
+        if path.suffix.lower() == ".exr":
+            _window(path.read_bytes())
         return mi.Bitmap(str(path))
     except (RuntimeError, ValueError, IndexError, MemoryError) as error:
         reason = "it is cut short, or damaged" if isinstance(error, (IndexError, MemoryError)) else one_line(str(error))
         raise _damaged("image", path, IMAGES, reason) from error
+
+
+def _window(content: bytes) -> None:
+    """Refuse an OpenEXR picture with more rows than fit into its file: Mitsuba would look for all, for hours."""
+    window = re.search(rb"dataWindow\0box2i\0\x10\0\0\0(.{16})", content[: 1 << 20], re.DOTALL)
+    if window is None:
+        raise ValueError("it is no OpenEXR picture")
+    left, top, right, bottom = struct.unpack("<4i", window[1])
+    width, height = right - left + 1, bottom - top + 1
+    # A row of chunks has at most 256 rows, and takes 8 bytes of the table of chunks.
+    if not (0 < width <= 2**17 and 0 < height <= len(content) // 8 * 256):
+        raise ValueError(f"{width} x {height} pixels do not fit into its {len(content)} bytes")
 
 
 def _runs(content: bytes) -> None:
@@ -165,7 +179,7 @@ def _runs(content: bytes) -> None:
     G. Ward, Real Pixels, 1991: each row is the mark (2, 2, width), and four channels of runs (128 + n, value) and
     literals (n, values...); or no row has a mark, and a pixel is four bytes.
     """
-    size = re.match(rb"#\?.*?\n\n-Y (\d{1,5}) \+X (\d{1,5})\n", content, re.DOTALL)
+    size = re.match(rb"#\?.*?\n\n-Y ([1-9]\d{,4}) \+X ([1-9]\d{,4})\n", content, re.DOTALL)
     if size is None:
         raise ValueError("it is no Radiance picture whose first pixel is the upper left one")
     height, width, at = int(size[1]), int(size[2]), size.end()

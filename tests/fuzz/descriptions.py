@@ -13,12 +13,6 @@ from asperity.models import MODELS
 Rng = np.random.Generator
 Description = dict[str, Any]
 
-SCENE: Description = {
-    "type": "scene",
-    "integrator": {"type": "path", "max_depth": 4},
-    "light": {"type": "constant"},
-    "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 4, "height": 4}},
-}
 PLAIN = [{"type": "diffuse"}, {"type": "roughconductor", "alpha": 0.2}, {"type": "plastic"}, {"type": "dielectric"}]
 
 
@@ -28,9 +22,9 @@ def one_of(rng: Rng, *choices: Any) -> Any:
 
 def number(rng: Rng, low: float, high: float, open_low: bool) -> float:
     """In the range, often at its ends."""
-    end = low + 1e-3 if open_low else low
-    high = min(high, 4.0)
-    return float(one_of(rng, end, high, rng.uniform(end, high), rng.uniform(end, high)))
+    end = low + 1e-6 if open_low else low
+    usual = rng.uniform(end, min(high, 4.0), size=5)
+    return float(one_of(rng, end, min(high, 10.0 ** rng.integers(1, 30)), *usual))
 
 
 def texels(rng: Rng, values: Any, **given: Any) -> Description:

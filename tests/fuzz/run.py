@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import cycle
 from pathlib import Path
+from tempfile import TemporaryFile
 from threading import Timer
 from typing import NamedTuple
 
@@ -24,6 +25,8 @@ HERE = Path(__file__).parent
 ROTATION = {"scalar_rgb": 200, "scalar_spectral": 200, "llvm_ad_rgb": 40, "llvm_ad_spectral": 40}
 """Variants in turn, and how many cases their children try; LLVM compiles for each of them."""
 GOOD = ("fine", "refused")
+START = 120
+"""Seconds in which a child has imported everything and made its files."""
 
 
 class Outcome(NamedTuple):
@@ -45,37 +48,40 @@ def batch(kind: str, variant: str, seed: int, start: int, stop: int, patience: f
     """Outcomes of the cases from ``start`` to ``stop``; a child that dies or says nothing is followed by another."""
     while start < stop:
         command = [sys.executable, str(HERE / "worker.py"), kind, variant, str(seed), str(start), str(stop)]
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        hung = []
-
-        def kill(child: subprocess.Popen[str] = child, hung: list[bool] = hung) -> None:
-            hung.append(True)
-            child.kill()
-
-        trying = None
-        assert child.stdout
-        assert child.stderr
-        while True:
-            watch = Timer(patience if trying is not None else 120, kill)  # starting, a child imports, and makes files
-            watch.start()
-            line = child.stdout.readline()
-            watch.cancel()
-            if not line:
-                break
-            told = json.loads(line)
-            trying = told.get("trying")
-            if trying is None:
-                yield Outcome(kind, variant, seed, told["index"], told["result"], told["what"])
-                start = told["index"] + 1
-        status, last = child.wait(), child.stderr.read().strip().splitlines()[-3:]
+        trying = what = None
+        with TemporaryFile("w+") as errors:  # a pipe would fill
+            child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
+            for line in watched(child, patience):
+                told = json.loads(line)
+                trying, what = told.get("trying"), told["what"]
+                if trying is None:
+                    yield Outcome(kind, variant, seed, told["index"], told["result"], what)
+                    start = told["index"] + 1
+            status = child.wait()
+            errors.seek(0)
+            last = errors.read().strip().splitlines()[-3:]
         if status == 0 and start >= stop:
             return
         if trying is None and start < stop:
             raise RuntimeError("\n".join(["the worker does not start:", *last]))
         index = stop - 1 if trying is None else trying  # it may also crash when it ends
-        result = f"hung for {patience:g} s" if hung else f"crashed with status {status}"
-        yield Outcome(kind, variant, seed, index, result, " / ".join(last))
+        yield Outcome(kind, variant, seed, index, f"hung or crashed, status {status}: {' / '.join(last)}", what or "")
         start = index + 1
+
+
+def watched(child: subprocess.Popen[str], patience: float) -> Iterator[str]:
+    """The lines of a child, which is killed if it says nothing for so many seconds; more at first, when it imports."""
+    assert child.stdout
+    wait = max(patience, START)
+    while True:
+        watch = Timer(wait, child.kill)
+        watch.start()
+        line = child.stdout.readline()
+        watch.cancel()
+        if not line:
+            return
+        yield line
+        wait = patience
 
 
 def plan(kind: str, count: int) -> Iterator[tuple[str, str, int, int]]:

@@ -10,8 +10,9 @@ import contextlib
 import json
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import descriptions
 import files
@@ -24,6 +25,14 @@ from asperity.lab import evaluate
 
 OBSCURE = ("Traceback", ".cpp", ".py", "dictionary node", "nanobind", "\n")
 """Not to be found in an error message."""
+
+
+class Case(NamedTuple):
+    """What it is, in words; what to do; and whether that has to be refused."""
+
+    what: str
+    act: Callable[[], Any]
+    flawed: bool
 
 
 def tell(**what: Any) -> None:
@@ -50,36 +59,36 @@ def nowhere_negative(found: list[float]) -> list[float]:
     return [x if x > -1e-6 else float("nan") for x in found]
 
 
-def described(seed: int, index: int) -> tuple[str, str]:
-    """What became of a random description, and what it was."""
+def described(seed: int, index: int) -> Case:
+    """A random description of a material."""
     rng = np.random.default_rng([seed, index, 0])
     description = descriptions.material(rng)
     flaw = descriptions.flaw(rng, description) if rng.random() < 0.5 else ""
     told = f"{flaw}: {loading.short(description, 600)}"
-    return outcome(lambda: nowhere_negative(values(loading.load(description), rng)), bool(flaw)), told
+    return Case(told, lambda: nowhere_negative(values(loading.load(description), rng)), bool(flaw))
 
 
-def damaged(seed: int, index: int, seeds: Path, folder: Path) -> tuple[str, str]:
-    """What became of a damaged file, and which it was."""
+def damaged(seed: int, index: int, seeds: Path, folder: Path) -> Case:
+    """A damaged file."""
     rng = np.random.default_rng([seed, index, 1])
     name = sorted(files.READERS)[index % len(files.READERS)]
     path = folder / name
     (folder / "map.png").write_bytes((seeds / "map.png").read_bytes())  # other files refer to it
     path.write_bytes(files.damaged((seeds / name).read_bytes(), rng))
-    return outcome(lambda: files.quietly(files.READERS[name])(path), False), name
+    return Case(name, lambda: files.quietly(files.READERS[name])(path), False)
 
 
-def outcome(act: Any, flawed: bool) -> str:
+def outcome(case: Case) -> str:
     """``fine`` or ``refused``, or what is wrong with it."""
     try:
-        found = act()
+        found = case.act()
     except AsperityError as error:
         message = str(error)
         clear = len(message) < 500 and not any(noise in message for noise in OBSCURE)
         return "refused" if clear else f"obscure: {message}"
     except Exception as error:
         return f"raised {type(error).__name__}: {error}"
-    if flawed:
+    if case.flawed:
         return "accepted"
     if isinstance(found, list) and not all(np.isfinite(found)):
         return "not finite"
@@ -106,9 +115,9 @@ def main(kind: str, variant: str, seed: int, indices: range) -> None:
         mi.set_variant(variant)
         mi.set_log_level(mi.LogLevel.Error)
         for index in indices:
-            tell(trying=index)
-            result, what = described(seed, index) if kind == "descriptions" else damaged(seed, index, seeds, folder)
-            tell(index=index, result=result, what=what)
+            case = described(seed, index) if kind == "descriptions" else damaged(seed, index, seeds, folder)
+            tell(trying=index, what=case.what)
+            tell(index=index, result=outcome(case), what=case.what)
 
 
 if __name__ == "__main__":
