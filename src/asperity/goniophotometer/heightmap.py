@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 
+from .. import loading
 from ..errors import ParameterError, UnknownNameError, UnreadableFileError, readable
 from .periodic import TOLERANCE
 
@@ -28,9 +29,9 @@ def read(path: str | Path, channel: str | None = None) -> np.ndarray:
     try:
         if found.suffix.lower() == ".npy":
             return np.load(found, allow_pickle=False)
-        bitmap = mi.Bitmap(str(found))
+        bitmap = loading.image(found)
         names, values = [field.name for field in bitmap.struct_()], np.atleast_3d(np.array(bitmap))
-    except (OSError, ValueError, RuntimeError) as error:
+    except (OSError, EOFError, ValueError, RuntimeError, TokenError) as error:
         raise UnreadableFileError("height field", found, FORMATS, str(error)) from error
     chosen = values[..., _channel(names, values, channel)]
     return chosen / np.iinfo(chosen.dtype).max if found.suffix.lower() == ".png" else chosen

@@ -12,7 +12,8 @@ from typing import Any, ClassVar
 import mitsuba as mi
 import numpy as np
 
-from ..errors import ParameterError, UnknownNameError, UnreadableFileError, readable
+from .. import loading
+from ..errors import ParameterError, UnknownNameError, readable
 from . import heightmap
 from .periodic import Triangles, centred, normals
 from .tile import Tile
@@ -236,7 +237,7 @@ class HeightField(Triangulated):
 def _bsdf(description: dict[str, Any]) -> Any:
     """The BSDF; Mitsuba's complaints become ours."""
     try:
-        bsdf = mi.load_dict(description)
+        bsdf = loading.load(description)
     except Exception as error:  # plugins in Python raise whatever they like
         raise ParameterError(f"bsdf = {description}: {error}") from error
     if not isinstance(bsdf, mi.BSDF):
@@ -278,20 +279,9 @@ def _spacing(given: Any) -> tuple[float, float]:
 
 def _read(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Vertices (n, 3), faces (m, 3) and texture coordinates (n, 2), if there are any, of a mesh that has some."""
-    try:
-        mesh = mi.load_dict({"type": path.suffix[1:].lower(), "filename": str(path), "face_normals": True})
-    except RuntimeError as error:
-        raise UnreadableFileError("mesh", path, MESHES, str(error)) from error
+    mesh = loading.mesh(path, face_normals=True)
     parameters = mi.traverse(mesh)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
-    if not len(faces):
-        raise ParameterError(f"mesh {path.name}: it has no faces.")
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-    wild = np.flatnonzero(faces.max(axis=1) >= len(vertices))
-    if len(wild):
-        raise ParameterError(
-            f"mesh: face {wild[0]} is of vertices {faces[wild[0]].tolist()}, and there are {len(vertices)}; "
-            f"{len(wild)} such faces."
-        )
     uv = np.array(parameters["vertex_texcoords"]).reshape(-1, 2) if mesh.has_vertex_texcoords() else None
     return vertices, faces, uv

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...conductors import Conductor
 from ...errors import ParameterError
+from ...loading import load
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import Dielectric, conductor
 from ...microfacet.numerics import clamp
@@ -114,7 +115,7 @@ class Micrograin(Declared):
     @classmethod
     def microgeometry(cls, description: dict[str, Any]) -> ExplicitGrains:
         """The explicit grains that a scene's description of this BSDF stands for."""
-        mi.load_dict(description, parallel=False)  # complains of what is wrong with it
+        load(description)  # complains of what is wrong with it
         return ExplicitGrains.of(cls.defaults() | description, set(description))
 
     def configure(self, given: set[str]) -> None:
