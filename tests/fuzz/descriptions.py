@@ -20,11 +20,10 @@ def one_of(rng: Rng, *choices: Any) -> Any:
     return choices[rng.integers(len(choices))]
 
 
-def number(rng: Rng, low: float, high: float, open_low: bool) -> float:
+def number(rng: Rng, low: float, high: float) -> float:
     """In the range, often at its ends."""
-    end = low + 1e-6 if open_low else low
-    usual = rng.uniform(end, min(high, 4.0), size=5)
-    return float(one_of(rng, end, min(high, 10.0 ** rng.integers(1, 30)), *usual))
+    usual = rng.uniform(low, min(high, 4.0), size=5)
+    return float(one_of(rng, low, min(high, 10.0 ** rng.integers(1, 30)), *usual))
 
 
 def texels(rng: Rng, values: Any, **given: Any) -> Description:
@@ -36,7 +35,7 @@ def texture(rng: Rng, parameter: parameters.Texture) -> Any:
     """A number or a texture that the parameter allows."""
 
     def draw() -> float:
-        return number(rng, parameter.low, parameter.high, parameter.open_low)
+        return number(rng, parameter.low, parameter.high)
 
     return one_of(
         rng,
