@@ -138,6 +138,43 @@ def hard_pairs(seed: int = 0) -> tuple[mi.Vector3f, mi.Vector3f]:
     return vectors(np.concatenate(wi)), vectors(np.concatenate(wo))
 
 
+def special_pairs(both_sides: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """Return pairs wi, wo (n, 3) that formulas treat apart, exactly so in float32; the horizon is not among them.
+
+    Either is normal, or lies on an axis; or both are coplanar, at right angles, equal, mirrored by the normal or by an
+    axis; and all of that straight through the surface. With ``both_sides``, wi may come from below.
+    """
+    cosines = np.cos(np.radians([7, 23, 45, 60, 77.1, 89.9]))
+    axes = np.array([[1, 0], [0, 1], [-1, 0], [0, -1], *np.array([[0.8, 0.6], [-0.28, 0.96]])])
+    generic = np.array([[0.48, 0.6, 0.64], [-0.36, 0.48, 0.8], [0.64, -0.768, 0.024]])
+    turns = ((1, 0), (-1, 0), (0, 1), (0, -1))  # cosine and sine of 0, 180, 90 and 270 degrees
+    special = [(axis, z) for axis in axes for z in cosines]
+    wi = [(0.0, 0.0, 1.0)]
+    wo = [(0.0, 0.0, 1.0)]
+    for axis, z in special:
+        w = raised(axis, z)
+        others = [(0.0, 0.0, 1.0), *generic, w * [1, -1, 1], w * [-1, 1, 1]]
+        others += [raised((c * axis[0] - s * axis[1], s * axis[0] + c * axis[1]), y) for c, s in turns for y in cosines]
+        wi += [w] * len(others)
+        wo += others
+    i, o = np.float32(wi + wo), np.float32(wo + wi)
+    i, o = np.concatenate([i, i]), np.concatenate([o, o * [1, 1, -1]])
+    return (np.concatenate([i, i * [1, 1, -1]]), np.concatenate([o, o * [1, 1, -1]])) if both_sides else (i, o)
+
+
+def raised(azimuth: Any, z: float) -> np.ndarray:
+    """Return the direction of cosine ``z`` over a horizontal unit vector."""
+    return np.array([*(np.sqrt(1 - z * z) * np.asarray(azimuth)), z])
+
+
+def at_pairs(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = None) -> np.ndarray:
+    """Return f |cos θo| of every channel and the pdf (channels + 1, n), for pairs of directions (n, 3)."""
+    si, out = interaction(vectors(wi), len(wi), wavelengths), vectors(wo)
+    value = mi.unpolarized_spectrum(bsdf.eval(mi.BSDFContext(), si, out))
+    density = bsdf.pdf(mi.BSDFContext(), si, out)
+    return np.concatenate([to_numpy(value, len(wi)), to_numpy(density, len(wi))])
+
+
 def vectors(directions: np.ndarray) -> mi.Vector3f:
     """Return an array (n, 3) as ``n`` Mitsuba vectors."""
     return mi.Vector3f(np.ascontiguousarray(directions.T, dtype=np.float32))

@@ -13,7 +13,7 @@ import mitsuba as mi
 
 from asperity.lab import evaluate
 
-from . import consistency, density, energy, finiteness, gradients, variants
+from . import consistency, continuity, density, energy, finiteness, gradients, variants
 from .results import Curves, Histogram, Result, Violations, complaint
 
 __all__ = ["CHECKS", "NAMES", "Curves", "Histogram", "Result", "Violations", "check"]
@@ -26,6 +26,7 @@ CHECKS: dict[str, Callable[[mi.BSDF], Result]] = {
     "eval_pdf": consistency.eval_pdf,
     "determinism": consistency.determinism,
     "reciprocity": consistency.reciprocity,
+    "continuity": continuity.continuity,
     "finiteness": finiteness.finiteness,
     "energy": energy.energy,
     "furnace": energy.furnace,
