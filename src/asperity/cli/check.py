@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +9,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from asperity.errors import ParameterError, UnknownNameError
+from asperity.errors import ParameterError
 from asperity.files import atomically
 
 from . import console, materials, variants
@@ -42,9 +40,7 @@ def check(
         materials.check_material(description)
         from asperity.lab import checks
 
-    names = only or checks.NAMES
-    for unknown in set(names) - set(checks.NAMES):
-        raise UnknownNameError("check", unknown, checks.NAMES)
+    names = [checks.canonical(check) for check in only or checks.NAMES]
     with console.progress("checks") as progress:
         task = progress.add_task("", total=len(names))
         results = checks.check(
@@ -72,8 +68,7 @@ def draw(failures: list[Any], name: str, folder: Path) -> None:
     for result in failures:
         if result.evidence is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            slug = re.sub(r"\W+", "-", unicodedata.normalize("NFKD", result.name))  # chi², with a plain 2
-            path = folder / f"{name}-{slug}.png"
+            path = folder / f"{name}-{result.name}.png"
             with atomically(path) as part:
                 pictures.draw(result, part)
             typer.echo(path)

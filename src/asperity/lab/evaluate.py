@@ -13,23 +13,28 @@ import mitsuba as mi
 import numpy as np
 from scipy.stats import qmc
 
+from asperity.errors import ParameterError
+
 SHORTEST, LONGEST = 400.0, 700.0
 """nm. Spectral variants evaluate at wavelengths between these."""
 
 
 def active_variant() -> str:
-    """Return the variant in use; complain if none is."""
+    """Return the variant in use; raise ParameterError if none is."""
     if mi.variant() is None:
-        raise RuntimeError('no Mitsuba variant is set: call mitsuba.set_variant("llvm_ad_rgb"), say, first')
+        raise ParameterError('no Mitsuba variant is set: call mitsuba.set_variant("llvm_ad_rgb"), say, first')
     return str(mi.variant())
 
 
 def load(description: dict[str, Any] | mi.BSDF) -> mi.BSDF:
-    """Return the BSDF that a dictionary describes, or the BSDF itself if it is one already."""
+    """Return the BSDF that a dictionary describes, or the BSDF itself if it is one already; raise ParameterError."""
     variant = active_variant()
-    bsdf = mi.load_dict(description) if isinstance(description, dict) else description
+    try:
+        bsdf = mi.load_dict(description, parallel=False) if isinstance(description, dict) else description
+    except RuntimeError as error:  # Mitsuba knows no other
+        raise ParameterError(str(error)) from error
     if not isinstance(bsdf, mi.BSDF):
-        raise TypeError(f"expected a BSDF of variant {variant} or the dictionary of one, got {bsdf!r:.200}")
+        raise ParameterError(f"expected a BSDF of variant {variant} or the dictionary of one, got {bsdf!r:.200}")
     return bsdf
 
 

@@ -20,8 +20,8 @@ REACH = 4.0
 1 / (2^p - 1), which is 1 for a kink, 2.4 for a root; a jump changes nothing between them."""
 
 POLE = 1.3
-"""Where neighbours grow by more than this as the distance halves, or all round, there may be a pole, and of any strength
-in a direction between them: the centre may be any higher, but no lower."""
+"""Where neighbours grow by more than this as the distance halves, or all round, there may be a pole, and of any
+strength in a direction between them: the centre may be any higher, but no lower."""
 
 TOLERANCE = (1e-2, 1e-5)
 """Relative and absolute: steps as small as this are no jumps that anybody sees, but may be rounding errors."""
@@ -67,9 +67,10 @@ def continuity(bsdf) -> Result:
     by = excess(centre, near, far)
     row, worst = np.unravel_index(np.argmax(by), by.shape)
     by, bad = by.max(axis=0), by.max(axis=0) > 1
+    what = "pdf" if row == len(values) - 1 else "eval"
     example = (
-        f"; {'pdf' if row == len(values) - 1 else 'eval'} {centre[row, worst]:.3g}, but {np.mean(near[row, worst]):.3g} "
-        f"nearby, at wi {named(angles(wi[worst]))}, wo {named(angles(wo[worst]))}"
+        f"; {what} {centre[row, worst]:.3g}, but {near[row, worst].mean():.3g} nearby, "
+        f"at wi {named(angles(wi[worst]))}, wo {named(angles(wo[worst]))}"
     )
     return Result(
         "continuity",
