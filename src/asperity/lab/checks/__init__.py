@@ -16,7 +16,7 @@ import mitsuba as mi
 from asperity.errors import ParameterError, UnknownNameError
 from asperity.lab import evaluate
 
-from . import consistency, continuity, density, energy, finiteness, gradients, variants
+from . import bounds, consistency, continuity, density, energy, finiteness, gradients, variants
 from .results import SIGNIFICANCE, Curves, Histogram, Result, Violations, complaint
 
 __all__ = ["CHECKS", "NAMES", "Curves", "Histogram", "Result", "Violations", "canonical", "check"]
@@ -31,6 +31,7 @@ CHECKS: dict[str, Callable[..., Result]] = {
     "reciprocity": consistency.reciprocity,
     "continuity": continuity.continuity,
     "finiteness": finiteness.finiteness,
+    "bounds": bounds.bounds,
     "energy": energy.energy,
     "furnace": energy.furnace,
     "gradients": gradients.gradients,

@@ -177,14 +177,17 @@ def difference_error(
 
 
 def weighted_pairs(bsdf: mi.BSDF, n: int) -> tuple[mi.Vector3f, mi.Vector3f, np.ndarray]:
-    """Return pairs of directions and their weights.
+    """Return ``n`` random pairs of directions and their weights, then the hard pairs, with weights of 0.
 
     Half of wo are the BSDF's own samples, and weights fall with their density, so that a narrow lobe counts as much as
-    it reflects.
+    it reflects. At hard pairs only NaN counts; in the same arrays, they need no kernels of their own.
     """
     wi = random_incident(bsdf, n, 18)
     own = draw_samples(bsdf, wi, n, seed=19)
     use_own = mi.Bool(own.smooth) & (dr.arange(mi.UInt32, n) % 2 == 0)
     wo = dr.select(use_own, own.drawn.wo, evaluate.uniform_sphere(n, 20))
+    weight = 1 / (evaluate.to_numpy(evaluate.pdf(bsdf, wi, wo), n)[0] + 1 / (4 * np.pi))
+    both = [np.concatenate([np.array(w).T, np.array(hard).T]) for w, hard in zip((wi, wo), evaluate.hard_pairs())]
+    wi, wo = map(evaluate.vectors, both)
     dr.eval(wi, wo)
-    return wi, wo, 1 / (evaluate.to_numpy(evaluate.pdf(bsdf, wi, wo), n)[0] + 1 / (4 * np.pi))
+    return wi, wo, np.append(weight, np.zeros(len(both[0]) - n))

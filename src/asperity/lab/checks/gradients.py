@@ -8,8 +8,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from asperity.lab import evaluate
-
 from .derivatives import (
     GRADIENT_ERROR,
     Calls,
@@ -89,16 +87,6 @@ def inside(initial: Values) -> tuple[Values, Values]:
     return values, sizes
 
 
-def with_hard_pairs(
-    wi: mi.Vector3f, wo: mi.Vector3f, weight: np.ndarray
-) -> tuple[mi.Vector3f, mi.Vector3f, np.ndarray]:
-    """Append the hard pairs, with weights of 0: what is compiled for the same arrays serves both."""
-    both = [np.concatenate([np.array(w).T, np.array(h).T]) for w, h in zip((wi, wo), evaluate.hard_pairs())]
-    i, o = map(evaluate.vectors, both)
-    dr.eval(i, o)
-    return i, o, np.append(weight, np.zeros(len(both[0]) - weight.size))
-
-
 def gradients(bsdf: mi.BSDF) -> Result:
     """Compare automatic with finite differences, a parameter at a time, and look for NaN at hard directions.
 
@@ -110,7 +98,7 @@ def gradients(bsdf: mi.BSDF) -> Result:
     keys = list(parameters.initial)
     if not keys or not dr.is_diff_v(mi.Float):
         return Result("gradients", None, "has no differentiable parameter")
-    wi, wo, weight = with_hard_pairs(*weighted_pairs(bsdf, LANES))
+    wi, wo, weight = weighted_pairs(bsdf, LANES)
     direct, virtual = Calls(bsdf, wi, wo), Calls(pointers(bsdf, weight.size), wi, wo)
     if not np.array(direct.value()).any():
         return Result("gradients", None, "has only delta lobes: eval is 0")

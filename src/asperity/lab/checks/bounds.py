@@ -1,0 +1,78 @@
+"""Parameters at the ends of their ranges: values stay finite there, and derivatives neither NaN nor dead."""
+
+from __future__ import annotations
+
+import math
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from .derivatives import GRADIENT_ERROR, Calls, Parameters, along, difference_error, pointers, weighted_pairs
+from .finiteness import improprieties
+from .results import Curves, Result
+
+REFLECTANCES = ("reflectance", "transmittance", "albedo", "color", "opacity")
+"""In names of anybody's parameters: those end at 0 and 1."""
+
+LANES = 5_000
+
+
+def ends(parameters: Parameters, key: str) -> tuple[float, float]:
+    """Return the least and the greatest value that a parameter may have; infinite where that is not known.
+
+    An object says so by a method ``ranges``, which returns (least, greatest) by the name of a parameter or texture.
+    What the innermost leaves open, the object around it may know: a colour is at most 1, whatever the texture says.
+    """
+    low, high = -math.inf, math.inf
+    for holder, name in parameters.path(key):
+        told = holder.ranges().get(name, (low, high)) if hasattr(holder, "ranges") else (low, high)
+        low, high = (known if math.isfinite(known) else other for known, other in zip((low, high), told))
+    coefficients = mi.is_spectral and parameters.initial[key].size == 3  # of a colour's spectrum, without a range
+    if coefficients:
+        return -math.inf, math.inf
+    texture = isinstance(parameters.scene.properties[key][2], mi.Texture)
+    if texture and math.isinf(low) and math.isinf(high) and any(word in key for word in REFLECTANCES):
+        return 0.0, 1.0
+    return low, high
+
+
+def improper_kinds(bsdf: mi.BSDF) -> set[str]:
+    """Return which of eval, pdf, weight and sample are negative or not finite somewhere."""
+    return {kind for kind, found in improprieties(bsdf).items() if found.excess.size}
+
+
+def bounds(bsdf: mi.BSDF) -> Result:
+    """Set each parameter to each end of its range; look for NaN, and compare derivatives with one-sided differences."""
+    parameters = Parameters(bsdf)
+    both = {key: ends(parameters, key) for key in parameters.initial}
+    cases = [(key, end, both[key]) for key in both for end in both[key] if math.isfinite(end)]
+    if not cases:
+        return Result("bounds", None, "no parameter tells its range: see `ranges` in the documentation of the checks")
+    wi, wo, weight = weighted_pairs(bsdf, LANES)
+    direct, virtual = Calls(bsdf, wi, wo), Calls(pointers(bsdf, weight.size), wi, wo)
+    errors, bad = {}, []
+    with parameters.restored():
+        parameters.place(parameters.initial)
+        known = improper_kinds(bsdf)  # what is bad everywhere is for `finiteness` to say
+        for key, end, (low, high) in cases:
+            name = f"{key} = {end:g}"
+            inward = (high - low if math.isfinite(high - low) else max(1.0, abs(end))) * (1 if end == low else -1)
+            values = parameters.initial | {key: np.full_like(parameters.initial[key], end)}
+            direction = along({k: np.full_like(v, inward) for k, v in values.items()}, key)
+            parameters.place(values)
+            bad += [f"{name}: {what}" for what in improper_kinds(bsdf) - known]
+            if dr.is_diff_v(mi.Float):
+                found = parameters.forward(virtual, values, direction)
+                numeric = parameters.differences(direct, values, direction, inward=True)
+                errors[name] = difference_error(found, numeric, weight, if_rough=0.0)
+                bad += [f"{name}: derivative"] * (not np.isfinite(found).all())
+    worst = max(errors, key=lambda name: np.nan_to_num(errors[name], nan=np.inf), default="")
+    measured = f"not finite, or negative: {', '.join(bad)}" if bad else f"finite at {len(cases)} ends of ranges"
+    return Result(
+        "bounds",
+        not bad and bool(errors.get(worst, 0) < GRADIENT_ERROR),
+        measured + (f"; {errors[worst]:.2g} mean relative error of derivatives at {worst}" if worst else ""),
+        f"finite; derivatives within {GRADIENT_ERROR} of one-sided differences: if 0, no optimiser leaves the bound",
+        Curves(list(errors), {"at the bound": np.array(list(errors.values()))}, "mean relative error", GRADIENT_ERROR),
+    )
