@@ -18,12 +18,16 @@ VERDICT = {True: ("passed", "green"), False: ("failed", "bold red"), None: ("ski
 
 
 def check(
-    target: Annotated[str | None, typer.Argument(metavar="BSDF", help="A model, or any BSDF of Mitsuba.")] = None,
+    target: Annotated[str | None, typer.Argument(metavar="BSDF", help="A BSDF: ours, Mitsuba's or yours.")] = None,
     settings: materials.Settings = None,
     preset: materials.PresetName = None,
     material: materials.MaterialFile = None,
     pictures: Annotated[Path, typer.Option(help="Folder for pictures of what failed.")] = Path("asperity-check"),
     only: Annotated[list[str] | None, typer.Option(help="A check to run instead of all; repeatable.")] = None,
+    plugins: Annotated[
+        list[Path] | None,
+        typer.Option("--import", metavar="FILE.py", help="A file that registers plugins of yours; repeatable."),
+    ] = None,
     variant: variants.Variant = None,
 ) -> None:
     """Check a BSDF: sampling, reciprocity, energy, gradients and more. The exit code is 1 if a check fails."""
@@ -36,9 +40,13 @@ def check(
     else:
         description = materials.chosen(preset, material, settings).material
     with console.status("loading"):
+        from asperity.lab import checks
+        from asperity.lab import plugins as own
+
+        for path in plugins or []:
+            own.load(path)
         variants.choose(variant)
         materials.check_material(description)
-        from asperity.lab import checks
 
     names = [checks.canonical(check) for check in only or checks.NAMES]
     with console.progress("checks") as progress:

@@ -154,15 +154,15 @@ def special_pairs(both_sides: bool = True) -> tuple[np.ndarray, np.ndarray]:
     generic = np.array([[0.48, 0.6, 0.64], [-0.36, 0.48, 0.8], [0.64, -0.768, 0.024]])
     turns = ((1, 0), (-1, 0), (0, 1), (0, -1))  # cosine and sine of 0, 180, 90 and 270 degrees
     special = [(axis, z) for axis in axes for z in cosines]
-    wi = [(0.0, 0.0, 1.0)]
-    wo = [(0.0, 0.0, 1.0)]
+    normal = np.array([0.0, 0.0, 1.0])
+    wi, wo = [normal], [normal]
     for axis, z in special:
         w = raised(axis, z)
-        others = [(0.0, 0.0, 1.0), *generic, w * [1, -1, 1], w * [-1, 1, 1]]
+        others = [normal, *generic, w * [1, -1, 1], w * [-1, 1, 1]]
         others += [raised((c * axis[0] - s * axis[1], s * axis[0] + c * axis[1]), y) for c, s in turns for y in cosines]
         wi += [w] * len(others)
         wo += others
-    i, o = np.float32(wi + wo), np.float32(wo + wi)
+    i, o = (np.array(pairs, dtype=np.float32) for pairs in (wi + wo, wo + wi))
     i, o = np.concatenate([i, i]), np.concatenate([o, o * [1, 1, -1]])
     return (np.concatenate([i, i * [1, 1, -1]]), np.concatenate([o, o * [1, 1, -1]])) if both_sides else (i, o)
 

@@ -122,14 +122,14 @@ def reciprocity(bsdf: mi.BSDF) -> Result:
     if (reason := NOT_RECIPROCAL.get(bsdf.class_name())) is not None:
         return Result("reciprocity", None, reason)
     wi, wo = (random_incident(bsdf, PAIRS, seed) for seed in (12, 13))
-    special = tuple(map(evaluate.vectors, evaluate.special_pairs(both_sides=sides(bsdf) != (1,))))
-    at_random, at_special = (both_ways(bsdf, *pair) for pair in ((wi, wo), special))
+    i, o = map(evaluate.vectors, evaluate.special_pairs(both_sides=sides(bsdf) != (1,)))
+    at_random, at_special = both_ways(bsdf, wi, wo), both_ways(bsdf, i, o)
     if not any(values.any() for values in (*at_random, *at_special)):
         return Result("reciprocity", None, "has only delta lobes")
     refracts = mi.has_flag(bsdf.flags(), mi.BSDFFlags.NonSymmetric)
     why = "Helmholtz, float32" + ("; refracted pairs: radiance against importance, for the η²" if refracts else "")
     found = agreement("reciprocity", wi, wo, at_random, (1e-3, 1e-5), 1e-5, why)
-    apart = agreement("reciprocity", *special, at_special, (1e-3, 1e-5), 0, why + "; normal, coplanar, retro, mirror")
+    apart = agreement("reciprocity", i, o, at_special, (1e-3, 1e-5), 0, why + "; normal, coplanar, retro, mirror")
     return apart if found.passed and not apart.passed else found
 
 

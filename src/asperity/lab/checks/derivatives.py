@@ -18,7 +18,18 @@ GRADIENT_ERROR = 1e-2
 STEPS = 1e-2 / 2.0 ** np.arange(4)
 """Of finite differences, relative to the parameter's magnitude."""
 
+ROUNDING = 16 * np.finfo(np.float32).eps
+"""Relative errors of values."""
+
 Values = Mapping[str, np.ndarray]
+
+
+class Estimate(NamedTuple):
+    """A derivative, lane by lane; by how much those of two steps disagree; and what rounding errors may do to it."""
+
+    derivative: np.ndarray
+    doubt: np.ndarray
+    noise: np.ndarray
 
 
 class Quantity(Protocol):
@@ -116,29 +127,17 @@ class Parameters:
         slopes = {key: np.array(dr.grad(leaf), dtype=np.float64) for key, leaf in leaves.items()}
         return np.array([np.sum(slopes[key] * directions[key]) for key in leaves])
 
-    def differences(
-        self, quantity: Quantity, values: Values, directions: Values, inward: bool = False
-    ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Finite differences along ``directions``, a triple for each pair of `STEPS`: derivative, doubt, noise.
-
-        They are central, or with ``inward`` one-sided; extrapolated (Richardson): errors are O(h⁴), or O(h²). The
-        doubt is by how much the two steps of a pair disagree, the noise what rounding errors of the values may do.
-        """
+    def differences(self, quantity: Quantity, values: Values, directions: Values) -> list[Estimate]:
+        """Central differences along ``directions``, extrapolated from each pair of `STEPS`: errors are O(h⁴)."""
 
         def at(step: float) -> np.ndarray:
             self.place({key: value + step * directions[key] for key, value in values.items()})
             return np.array(quantity.value(), dtype=np.float64)
 
-        middle, order = at(0), 1 if inward else 2
-        size = np.abs(middle)
-        slopes = []
-        for step in STEPS:
-            up, down = at(step), middle if inward else at(-step)
-            size = np.maximum(size, np.abs(up))
-            slopes.append((up - down) / (step * order))
-        rounding = 16 * np.finfo(np.float32).eps * size
+        slopes = [(at(step) - at(-step)) / (2 * step) for step in STEPS]
+        rounding = ROUNDING * np.abs(at(0))
         return [
-            (fine + (fine - coarse) / (2**order - 1), np.abs(fine - coarse), rounding / step)
+            Estimate(fine + (fine - coarse) / 3, np.abs(fine - coarse), rounding / step)
             for coarse, fine, step in zip(slopes, slopes[1:], STEPS)
         ]
 
@@ -156,18 +155,18 @@ def mean_relative(error: np.ndarray, size: np.ndarray, weight: np.ndarray) -> fl
 
 def difference_error(
     automatic: np.ndarray,
-    differences: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    estimates: list[Estimate],
     weight: np.ndarray,
     if_rough: float = np.inf,
 ) -> float:
-    """Return the mean relative error of ``automatic`` against finite differences.
+    """Return the mean relative error of ``automatic`` against estimates of several steps.
 
     Rounding errors grow with 1/h, truncation errors with powers of h over the lobe's width, which is not known: a
     right derivative agrees with the differences of one of the steps, a wrong one with none. Lanes whose differences
     depend on the step straddle a jump or a kink, and are left out; if they are most of all, the error is ``if_rough``.
     """
     errors = []
-    for numeric, doubt, noise in differences:
+    for numeric, doubt, noise in estimates:
         smooth = doubt <= 0.1 * np.abs(numeric) + noise
         allowed = np.abs(numeric) + noise / GRADIENT_ERROR
         error = mean_relative(np.abs(automatic - numeric), allowed, np.where(smooth, weight, 0))

@@ -55,7 +55,9 @@ def variants(description: dict[str, Any] | mi.BSDF) -> Result:
     if not isinstance(description, dict):
         return Result("variants", None, "needs the dictionary: an object belongs to one variant")
     usable, absent = usable_variants()
-    before, values, troubles, skipped = evaluate.active_variant(), {}, [], []
+    before, values = evaluate.active_variant(), {}
+    troubles: list[str] = []
+    skipped: list[str] = []
     for variant in usable:
         try:
             mi.set_variant(variant)
