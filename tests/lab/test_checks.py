@@ -1,6 +1,8 @@
 """The checks accept Mitsuba's own BSDFs, and catch models that are wrong in one way each."""
 
 import asperity  # noqa: F401, I001  (before Mitsuba: chooses the LLVM)
+from types import SimpleNamespace
+
 import broken
 import mitsuba as mi
 import numpy as np
@@ -8,6 +10,7 @@ import pytest
 
 from asperity.errors import AsperityError
 from asperity.lab import checks, evaluate, pictures
+from asperity.lab.checks import bounds, variants
 
 RIGHT = {
     "diffuse": {"type": "diffuse"},
@@ -113,10 +116,89 @@ def test_known_fault_of_roughplastic():
     assert failed(results) == {"chi2", "pdf-integral", "finiteness"}
 
 
+SPELLINGS = {"chi²": "chi2", "PDF integral": "pdf-integral", "sampled_pdf": "sampled-pdf", "eval_pdf": "eval-pdf"}
+
+
+@pytest.mark.parametrize("given", [*SPELLINGS, *checks.NAMES])
+def test_names_can_be_typed_and_old_spellings_still_do(given):
+    assert checks.canonical(given) == SPELLINGS.get(given, given)
+    assert checks.canonical(given).isascii()
+
+
+def test_significance_is_an_argument():
+    """Near 1, any noise of the samples is taken for a fault."""
+    noisy = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.2, "material": "none"}
+    limits = [checks.check(noisy, only=["chi2"], significance=s)[0].bound for s in (0.01, 1e-6)]
+    assert "once in 100 " in limits[0] and "once in 1000000 " in limits[1]
+    assert failed(checks.check(noisy, only=["chi2"], significance=1 - 1e-9)) == {"chi2"}
+
+
+@pytest.mark.parametrize("name", ["vgroove", "pole", "narrow"])
+def test_continuity_accepts_poles_whose_strength_depends_on_the_way_there(name):
+    pole = {"type": "vgroove", "alpha": 1.0, "material": "Cu"}
+    elliptic = {"type": "vgroove", "distribution": "beckmann", "alpha_u": 0.2, "alpha_v": 0.6}
+    narrow = {"type": "roughconductor", "alpha": 0.001}
+    (result,) = checks.check({"vgroove": elliptic, "pole": pole, "narrow": narrow}[name], only=["continuity"])
+    assert result.passed, result
+
+
+def test_a_jump_is_told_with_its_directions():
+    (result,) = checks.check({"type": "broken_DimFromNormal"}, only=["continuity"])
+    assert "eval 0.0318, but 0.159 0.05° off, at wi θ 0°" in result.measured
+
+
+def test_bounds_finds_ranges_within_nested_bsdfs():
+    nested = {"type": "blendbsdf", "a": {"type": "broken_NegativeWhenSmooth"}, "b": {"type": "diffuse"}}
+    (result,) = checks.check(nested, only=["bounds"])
+    assert result.passed is False and "bsdf_0.roughness.value = 0.1: eval" in result.measured
+
+
+def told(**ranges):
+    return SimpleNamespace(ranges=lambda: ranges)
+
+
+INNER, OUTER = told(top=(0.0, np.inf), threshold=(-1.0, 1.0)), told(tau_0=(0.1, 0.9))
+
+
+@pytest.mark.parametrize("name, ends", [("top", (0.0, 0.9)), ("threshold", (-1.0, 1.0)), ("other", (0.1, 0.9))])
+def test_where_a_texture_leaves_its_range_open_its_owner_knows(name, ends):
+    path = [(object(), "value"), (INNER, name), (OUTER, "tau_0"), (object(), "bsdf")]
+    key = f"bsdf.tau_0.{name}.value"
+    scene = SimpleNamespace(properties={key: (None, None, None, 0)})
+    parameters = SimpleNamespace(path=lambda _: path, initial={key: np.zeros(1)}, scene=scene)
+    assert bounds.ends(parameters, key) == ends
+
+
+def test_bounds_skips_what_tells_no_range():
+    (result,) = checks.check({"type": "roughconductor", "alpha": 0.2}, only=["bounds"])
+    assert result.passed is None and "ranges" in result.measured
+
+
+def test_unused_parameters_of_mitsuba_are_no_trouble():
+    """The hair's absorption is None where pigments are given instead; its reciprocity is not a matter of code."""
+    gradients, reciprocity = checks.check({"type": "hair"}, only=["gradients", "reciprocity"])
+    assert gradients.passed, gradients
+    assert reciprocity.passed is None and "fibre" in reciprocity.measured
+
+
+def test_a_file_of_other_colours_is_no_fault(monkeypatch):
+    """What `measured` says of RGB files in spectral variants."""
+    probe = variants.probe
+
+    def picky(description):
+        if mi.is_spectral:
+            raise RuntimeError("Measurements in RGB format require the use of a RGB variant of Mitsuba!")
+        return probe(description)
+
+    monkeypatch.setattr(variants, "probe", picky)
+    (result,) = checks.check({"type": "diffuse"}, only=["variants"])
+    assert result.passed and "need other colours: skipped; " in result.measured and "RGB variant" in result.measured
+
+
 def test_parameters_are_given_back():
     bsdf = mi.load_dict({"type": "roughconductor", "alpha": 0.3, "specular_reflectance": 1.0})
     before = {key: np.array(value) for key, value in mi.traverse(bsdf)}
-    checks.check(bsdf, only=["gradients"])
+    checks.check(bsdf, only=["gradients", "bounds"])
     for key, value in mi.traverse(bsdf):
         assert np.array_equal(before[key], value)
 

@@ -39,9 +39,14 @@ def load(path: str | Path) -> None:
         except Exception as error:
             raise ParameterError(f"{path.name} fails: {type(error).__name__}: {error}") from error
 
-    if (earlier := _loaded.pop(path, None)) is not None:
-        mi.detail.remove_variant_callback(earlier)
+    forget(path)
     if mi.variant() is not None:
         run(None, mi.variant())
     mi.detail.add_variant_callback(run)
     _loaded[path] = run
+
+
+def forget(path: str | Path) -> None:
+    """Run a file no longer, if it was loaded; what it registered stays."""
+    if (run := _loaded.pop(Path(path).resolve(), None)) is not None:
+        mi.detail.remove_variant_callback(run)
