@@ -2,6 +2,17 @@
 
 Each check returns a ``Result`` that says what was measured and what was allowed, and why. Bounds follow from float32
 or from the statistics of the samples: seeds are fixed, so that a BSDF passes always or never.
+
+>>> asperity.lab.plugins.load("my_bsdf.py")  # runs it in every variant; not needed for Mitsuba's BSDFs and ours
+>>> check({"type": "my_bsdf"})
+
+``bounds`` knows that reflectances are in [0, 1]. Of other parameters a BSDF, or a texture, tells the ranges by a method
+
+>>> def ranges(self):
+>>>     return {"roughness": (0.001, 1.0), "absorption": (0.0, math.inf)}
+
+with the least and the greatest value by the name that `traverse` uses; an infinite one is not tested, nor one that the
+range does not contain.
 """
 
 from __future__ import annotations

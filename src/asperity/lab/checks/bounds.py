@@ -24,7 +24,7 @@ from .finiteness import improprieties
 from .results import Curves, Result
 
 REFLECTANCES = ("reflectance", "transmittance", "albedo", "color", "opacity")
-"""In names of anybody's parameters: those end at 0 and 1."""
+"""In names of the textures of BSDFs that tell no ranges: those end at 0 and 1."""
 
 LANES = 5_000
 
@@ -38,17 +38,16 @@ def ends(parameters: Parameters, key: str) -> tuple[float, float]:
     An object says so by a method ``ranges``, which returns (least, greatest) by the name of a parameter or texture.
     What the innermost leaves open, the object around it may know: a colour is at most 1, whatever the texture says.
     """
-    low, high = -math.inf, math.inf
-    for holder, name in parameters.path(key):
-        told = holder.ranges().get(name, (low, high)) if hasattr(holder, "ranges") else (low, high)
-        low, high = (known if math.isfinite(known) else other for known, other in zip((low, high), told))
-    coefficients = mi.is_spectral and parameters.initial[key].size == 3  # of a colour's spectrum, without a range
-    if coefficients:
+    if mi.is_spectral and parameters.initial[key].size == 3:  # coefficients of a colour's spectrum: without a range
         return -math.inf, math.inf
-    texture = isinstance(parameters.scene.properties[key][2], mi.Texture)
-    if texture and math.isinf(low) and math.isinf(high) and any(word in key for word in REFLECTANCES):
-        return 0.0, 1.0
-    return low, high
+    path = list(parameters.path(key))
+    tell = [holder.ranges().get(name, (-math.inf, math.inf)) for holder, name in path if hasattr(holder, "ranges")]
+    if not tell:
+        named = [name for holder, name in path if isinstance(holder, mi.BSDF)]
+        reflects = isinstance(path[0][0], mi.Texture) and any(word in named[0] for word in REFLECTANCES)
+        return (0.0, 1.0) if reflects else (-math.inf, math.inf)
+    low, high = ([end for end in both if math.isfinite(end)] for both in zip(*tell))
+    return low[0] if low else -math.inf, high[0] if high else math.inf
 
 
 def moved(values: Values, direction: Values, step: float) -> Values:

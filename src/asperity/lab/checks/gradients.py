@@ -41,6 +41,8 @@ class Render(NamedTuple):
         """Make the scene; a second object makes the sphere's BSDF one of several."""
         to_world = mi.ScalarTransform4f()
         lights = [{"type": "point", "position": p, "intensity": 30.0} for p in ([4, 1, 5], [-3, 2, 4], [0, -5, 1])]
+        film = {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}}
+        film["pixel_format"] = "luminance" if mi.is_monochromatic else "rgb"
         scene = {
             "type": "scene",
             "ball": {"type": "sphere", "bsdf": bsdf},
@@ -49,11 +51,13 @@ class Render(NamedTuple):
                 "type": "perspective",
                 "fov": 28,
                 "to_world": to_world.look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]),
-                "film": {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}},
+                "film": film,
             },
             **{f"light_{n}": light for n, light in enumerate(lights)},
         }
-        integrator = mi.load_dict({"type": "prb", "max_depth": 2})
+        # What inverse rendering uses; but it differentiates neither spectra forward nor polarised light (Mitsuba 3.9).
+        kind = "path" if mi.is_spectral or mi.is_polarized else "prb"
+        integrator = mi.load_dict({"type": kind, "max_depth": 2})
         return cls(mi.load_dict(scene, parallel=False), integrator, parameters.scene)
 
     @property
@@ -118,8 +122,7 @@ def gradients(bsdf: mi.BSDF) -> Result:
         return Result("gradients", None, "has only delta lobes: eval is 0")
     with parameters.restored():
         errors, slopes = compared(parameters, virtual, direct, weight)
-        # Mitsuba's prb knows no polarisation, and raises an exception where nothing has a derivative.
-        if slopes.any() and not mi.is_polarized:
+        if slopes.any():  # Mitsuba's prb raises an exception where nothing has a derivative
             render = Render.of(bsdf, parameters)
             rendered, _ = compared(parameters, render, render, np.ones(render.pixels))
             errors |= {f"{key} in a render": error for key, error in rendered.items()}
