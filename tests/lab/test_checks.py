@@ -244,3 +244,13 @@ def test_hard_pairs_are_unit_and_hit_the_horizon_exactly():
     assert np.allclose(np.linalg.norm(wo, axis=0), 1)
     assert (wi[2] == 0).any()
     assert (wo[2] == 0).any()
+
+
+def test_special_pairs_are_exact_and_off_the_horizon():
+    wi, wo = evaluate.special_pairs()
+    assert np.allclose(np.linalg.norm(wi, axis=1), 1) and np.allclose(np.linalg.norm(wo, axis=1), 1)
+    assert min(np.abs(wi[:, 2]).min(), np.abs(wo[:, 2]).min()) > 1e-3
+    for special in (wi == [0, 0, 1], wo == [0, 0, 1], wi == wo, wi == wo * [-1, -1, 1], wi == -wo):
+        assert special.all(axis=1).sum() >= 25
+    (one,) = evaluate.special_pairs(both_sides=False)[:1]
+    assert (one[:, 2] > 0).all()

@@ -23,6 +23,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from asperity.errors import ParameterError, UnknownNameError
 from asperity.lab import evaluate
@@ -112,8 +113,9 @@ def check(
 def attempt(name: str, bsdf: mi.BSDF, description: dict[str, Any] | mi.BSDF, significance: float) -> Result:
     """Run one check; a BSDF that raises an exception fails it."""
     try:
-        if name == "variants":
-            return variants.variants(description)
-        return CHECKS[name](bsdf, significance) if name in STATISTICAL else CHECKS[name](bsdf)
+        with np.errstate(all="ignore"):  # NaN is found, and told in the result
+            if name == "variants":
+                return variants.variants(description)
+            return CHECKS[name](bsdf, significance) if name in STATISTICAL else CHECKS[name](bsdf)
     except Exception as error:  # whatever a plugin raises is its failure, and is reported
         return Result(name, False, complaint(error), "raises no exception")

@@ -17,7 +17,7 @@ from .derivatives import (
     Values,
     along,
     difference_error,
-    pointers,
+    pointer,
     weighted_pairs,
 )
 from .finiteness import improprieties
@@ -69,9 +69,9 @@ def bounds(bsdf: mi.BSDF) -> Result:
     both = {key: ends(parameters, key) for key in parameters.initial}
     cases = [(key, end, both[key]) for key in both for end in both[key] if math.isfinite(end)]
     if not cases:
-        return Result("bounds", None, "no parameter tells its range: see `ranges` in the documentation of the checks")
+        return Result("bounds", None, "no parameter tells its range, by a method `ranges` (see asperity.lab.checks)")
     wi, wo, weight = weighted_pairs(bsdf, LANES)
-    virtual = Calls(pointers(bsdf, weight.size), wi, wo)
+    virtual = Calls(pointer(bsdf), wi, wo)
     errors, bad = {}, []
     with parameters.restored():
         parameters.place(parameters.initial)
@@ -82,7 +82,7 @@ def bounds(bsdf: mi.BSDF) -> Result:
             values = parameters.initial | {key: np.full_like(parameters.initial[key], end)}
             direction = along({k: np.full_like(v, inward) for k, v in values.items()}, key)
             parameters.place(values)
-            bad += [f"{name}: {what}" for what in improper_kinds(bsdf) - known]
+            bad += [f"{name}: {what}" for what in sorted(improper_kinds(bsdf) - known)]
             if dr.is_diff_v(mi.Float):
                 there, near, far = (
                     parameters.forward(virtual, moved(values, direction, step), direction)

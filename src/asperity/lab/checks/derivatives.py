@@ -43,7 +43,7 @@ class Quantity(Protocol):
 
 
 class Calls(NamedTuple):
-    """``eval`` of a BSDF or of pointers to BSDFs at pairs of directions, summed over channels."""
+    """``eval`` of a BSDF, or of a pointer to one, at pairs of directions, summed over channels."""
 
     target: Any
     wi: mi.Vector3f
@@ -61,10 +61,11 @@ class Calls(NamedTuple):
         return np.broadcast_to(np.array(dr.forward_to(value), dtype=np.float64), dr.width(value))
 
 
-def pointers(bsdf: mi.BSDF, lanes: int) -> mi.BSDFPtr:
-    """Return pointers to the BSDF, that Dr.Jit takes for pointers to any, as in a scene: it records a virtual call."""
-    other = mi.load_dict({"type": "diffuse"})
-    return dr.select(dr.opaque(mi.Bool, True, lanes), mi.BSDFPtr(bsdf), mi.BSDFPtr(other))
+def pointer(bsdf: mi.BSDF) -> mi.BSDFPtr:
+    """Return a pointer to the BSDF that Dr.Jit takes for one to any, as in a scene: it records a virtual call."""
+    found = mi.BSDFPtr(bsdf)
+    dr.make_opaque(found)
+    return found
 
 
 class Parameters:
