@@ -29,7 +29,7 @@ REFLECTANCES = ("reflectance", "transmittance", "albedo", "color", "opacity")
 LANES = 5_000
 
 STEP = 1e-3
-"""Into the range, relative to its length: from there derivatives are extrapolated to its end."""
+"""Into the range, relative to its length or to its end: from there derivatives are extrapolated to the end."""
 
 
 def ends(parameters: Parameters, key: str) -> tuple[float, float]:
@@ -78,7 +78,7 @@ def bounds(bsdf: mi.BSDF) -> Result:
         known = improper_kinds(bsdf)  # what is bad everywhere is for `finiteness` to say
         for key, end, (low, high) in cases:
             name = f"{key} = {end:g}"
-            inward = (high - low if math.isfinite(high - low) else max(1.0, abs(end))) * (1 if end == low else -1)
+            inward = min(high - low, max(1.0, abs(end))) * (1 if end == low else -1)
             values = parameters.initial | {key: np.full_like(parameters.initial[key], end)}
             direction = along({k: np.full_like(v, inward) for k, v in values.items()}, key)
             parameters.place(values)

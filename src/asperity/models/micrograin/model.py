@@ -88,12 +88,12 @@ class Micrograin(Declared):
     citation = CITATION
     table_betas: tuple[float, float] | None = None
 
-    tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1)
+    tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1, steep=True)
     beta = Texture(
-        "height of the grains over their radius: small is flat and shiny, large is rough", 1.0, low=1e-4, high=1e4
+        "height of the grains over their radius: small is flat and shiny, large is rough", 1.0, low=1e-4, high=100
     )
-    beta_x = Texture("beta along x, instead of beta", None, low=1e-4, high=1e4)
-    beta_y = Texture("beta along y, instead of beta", None, low=1e-4, high=1e4)
+    beta_x = Texture("beta along x, instead of beta", None, low=1e-4, high=100)
+    beta_y = Texture("beta along y, instead of beta", None, low=1e-4, high=100)
     metal = Conductor("metal of the grains", "none")
     specular = Flag("whether the grains reflect at their surface; false makes them Lambertian", True)
     diffuse_reflectance = Colour("albedo of diffuse or coated grains", 0.5)
