@@ -24,6 +24,9 @@ from numpy.typing import NDArray
 
 from .errors import AsperityError, ParameterError, UnreadableFileError, suggestion
 
+PLUGINS: set[str] = set()
+"""Names of ours; whoever registers them says so here."""
+
 DEEPEST = 64
 """Descriptions nested in each other; Mitsuba's time grows with the square of it."""
 
@@ -226,10 +229,8 @@ def no_plugin(name: str) -> str:
     """What to say about a plugin that nobody has."""
     import mitsuba as mi
 
-    from .models import MODELS, PHASES, TEXTURES
-
     mitsubas = (path.stem.removeprefix("lib") for path in (Path(mi.__file__).parent / "plugins").iterdir())
-    nearest = get_close_matches(name, [*MODELS, *TEXTURES, *PHASES, *mitsubas], n=1)
+    nearest = get_close_matches(name, [*PLUGINS, *mitsubas], n=1)
     return f"there is no plugin {name!r}." + (f" Did you mean {nearest[0]!r}?" if nearest else "")
 
 

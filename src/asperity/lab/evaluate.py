@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 from scipy.stats import qmc
 
+from asperity import loading
 from asperity.errors import ParameterError
 
 SHORTEST, LONGEST = 400.0, 700.0
@@ -29,10 +30,7 @@ def active_variant() -> str:
 def load(description: dict[str, Any] | mi.BSDF) -> mi.BSDF:
     """Return the BSDF that a dictionary describes, or the BSDF itself if it is one already; raise ParameterError."""
     variant = active_variant()
-    try:
-        bsdf = mi.load_dict(description, parallel=False) if isinstance(description, dict) else description
-    except RuntimeError as error:  # Mitsuba knows no other
-        raise ParameterError(str(error)) from error
+    bsdf = loading.load(description) if isinstance(description, dict) else description
     if not isinstance(bsdf, mi.BSDF):
         raise ParameterError(f"expected a BSDF of variant {variant} or the dictionary of one, got {bsdf!r:.200}")
     return bsdf
