@@ -80,7 +80,6 @@ BAD = {
     "number": (1.0, "up = 1.0: expected a vector"),
     "word": ("y", "up = 'y': expected a vector"),
     "flag": (True, "up = True: expected a vector"),
-    "texture": ({"type": "checkerboard"}, "up = .*expected a vector"),
 }
 
 
