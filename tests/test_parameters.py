@@ -1,9 +1,13 @@
 import asperity  # noqa: F401  isort: skip
 import mitsuba as mi
+import numpy as np
 import pytest
 
 from asperity.conductors import artist_friendly, materials
+from asperity.lab import evaluate
 from asperity.models import MODELS
+from asperity.models.micrograin import Micrograin
+from asperity.parameters import Declared
 
 
 def bitmap(low, high):
@@ -13,7 +17,8 @@ def bitmap(low, high):
 BAD = {
     "misspelt": ({"tau0": 0.3}, "no parameter 'tau0'. Did you mean 'tau_0'"),
     "too large": ({"tau_0": 1.5}, r"tau_0 = 1.5: expected a number or texture in \[0, 1\]"),
-    "zero": ({"beta": 0.0}, r"beta = 0.0: expected a number or texture in \(0, inf\)"),
+    "zero": ({"beta": 0.0}, r"beta = 0.0: expected a number or texture in \[0.0001, 10000\]"),
+    "huge": ({"beta": 1e20}, r"beta = 1e\+20: expected a number or texture in \[0.0001, 10000\]"),
     "NaN": ({"tau_0": float("nan")}, "tau_0 = nan"),
     "infinite": ({"beta": float("inf")}, "beta = inf"),
     "word for a number": ({"tau_0": "much"}, "tau_0 = 'much'"),
@@ -32,14 +37,18 @@ BAD = {
     "metal twice": ({"material": "Au", "eta": 1.0}, "material and eta exclude each other"),
     "beta twice": ({"beta": 1.0, "beta_x": 1.0}, "beta and beta_x exclude each other"),
     "half an index": ({"eta": 1.0}, "eta is given without k"),
+    "other half": ({"k": 1.0}, "k is given without eta"),
+    "edge alone": ({"edge_tint": 0.5}, "edge_tint is given without reflectivity"),
     "metal and albedo": ({"material": "Au", "diffuse_reflectance": 0.3}, "material.*exclude each other"),
     "metal without specular": ({"material": "Au", "specular": False}, "exclude each other"),
     "no second colour": ({"variation": "height"}, "needs a second colour"),
     "second colour of a mirror": ({"variation": "height", "material_2": "Au"}, 'needs two metals; material "none"'),
     "spectrum for a number": (
         {"tau_0": {"type": "irregular", "wavelengths": "400, 500, 600", "values": ".1, .2, .3"}},
-        "tau_0: a spectrum, where one number is expected",
+        "tau_0: a colour or spectrum, where one number is expected",
     ),
+    "colour for a number": ({"beta": {"type": "rgb", "value": [0.1, 0.2, 0.3]}}, "beta: a colour or spectrum"),
+    "illuminant for a number": ({"beta": {"type": "blackbody", "temperature": 5000.0}}, "beta: a colour or spectrum"),
     "two bases": ({"base": {"type": "diffuse"}, "other": {"type": "diffuse"}}, "no parameter 'other'"),
     "unused second colour": ({"material_2": "Au"}, "material_2: needs variation"),
     "Smith and more": ({"masking": "smith", "scattering": "multiple"}, "masking = .smith."),
@@ -111,7 +120,67 @@ def test_artist_friendly_metal_reflects_what_was_asked(rgb, reflectivity, edge_t
     assert at_normal[0] == pytest.approx(reflectivity, abs=2e-5)  # float32: eta and k reach 40 at the edges
 
 
-@pytest.mark.parametrize("given", [0, -3, 2.0, True, "two"])
+@pytest.mark.parametrize("given", [0, -3, 1001, 2.0, True, "two"])
 def test_whole_numbers_are_whole_and_in_range(rgb, given):
-    with pytest.raises(RuntimeError, match=r"max_bounces = .*: expected a whole number in \[1, inf\)"):
+    with pytest.raises(RuntimeError, match=r"max_bounces = .*: expected a whole number in \[1, 1000\]"):
         mi.load_dict({"type": "vgroove", "max_bounces": given})
+
+
+@pytest.mark.parametrize("model", ["micrograin", "vgroove", "deon", "merillou"])
+def test_a_metal_by_colour_reflects_it(rgb, model):
+    """Whatever the edge tint, at normal incidence, next to a mirror."""
+    once = {"max_bounces": 1} if model == "vgroove" else {}
+    n = mi.Vector3f(0, 0, 1)
+    mirror = evaluate.eval(mi.load_dict({"type": model, **once}), n, n)
+    colour = {"type": "rgb", "value": [0.9, 0.5, 0.1]}
+    for tint in ({}, {"edge_tint": 0.7}):
+        metal = mi.load_dict({"type": model, **once, "reflectivity": colour, **tint})
+        ratio = np.array(evaluate.eval(metal, n, n) / mirror).ravel()
+        np.testing.assert_allclose(ratio, [0.9, 0.5, 0.1], rtol=1e-4)
+
+
+def xml(children, model="micrograin"):
+    return mi.load_string(f'<bsdf version="3.0.0" type="{model}">{children}</bsdf>').model
+
+
+def test_xml_says_it_all(rgb):
+    """Choices, metals by name and by index, flags, whole numbers."""
+    model = xml('<string name="masking" value="height"/><string name="material" value="Au"/>')
+    assert model.masking == "height" and not model.metal.mirror
+    model = xml('<float name="eta" value="0.2"/><float name="k" value="3"/><spectrum name="eta_2" value="1"/>'
+                '<float name="k_2" value="0"/><string name="variation" value="normal"/>')  # fmt: skip
+    assert model.metal.k.mean()[0] == 3 and model.metal_2.eta.mean()[0] == 1
+    assert xml('<boolean name="specular" value="false"/>').specular is False
+    model = xml('<integer name="max_bounces" value="7"/><rgb name="reflectivity" value="0.9, 0.5, 0.1"/>', "vgroove")
+    assert model.max_bounces == 7 and not model.metal.mirror
+
+
+@pytest.mark.parametrize(
+    "children, message",
+    [
+        ('<string name="masking" value="hight"/>', "Did you mean 'height'"),
+        ('<boolean name="tau_0" value="true"/>', "tau_0 = True"),
+        ('<integer name="specular" value="1"/>', "specular = 1"),
+        ('<texture type="checkerboard"/>', r"(.|\n)* has no name. Allowed: base, beta, "),
+        ('<float name="_arg_0" value="0.5"/>', "has no name. Allowed: base, beta, "),
+        ('<bsdf type="diffuse"/><bsdf type="diffuse"/>', "base: 2 nested BSDFs are given, one is allowed"),
+    ],
+    ids=["choice", "flag for a number", "number for a flag", "unnamed texture", "made-up name", "two bases"],
+)
+def test_bad_xml_is_named(rgb, children, message):
+    with pytest.raises(RuntimeError, match=f"ParameterError: (.*){message}"):
+        xml(children)
+
+
+def test_a_made_up_name_is_refused_in_a_dictionary(rgb):
+    with pytest.raises(RuntimeError, match=r"ParameterError: (.|\n)* has no name"):
+        mi.load_dict({"type": "lambertsphere", "_arg_0": {"type": "checkerboard"}})
+
+
+def test_a_parameter_of_another_class_keeps_its_name_there():
+    class Other(Declared):
+        roughness = Micrograin.beta
+        tau_0 = Micrograin.tau_0
+
+    assert [parameter.name for parameter in Other.declarations()] == ["roughness", "tau_0"]
+    assert Micrograin.beta.name == "beta" and Micrograin.beta is not Other.roughness
