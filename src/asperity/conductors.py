@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -110,8 +111,9 @@ class Conductor(Parameter):
             PARTS[name.removesuffix(self.suffix)].named(name).check(texture)
 
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Of all four parts."""
-        return {name + self.suffix: (part.low, part.high) for name, part in PARTS.items()}
+        """Of all four parts, but not k = 0, where derivatives are infinite at the critical angle."""
+        ends = {name: (part.low, part.high) for name, part in PARTS.items()} | {"k": (-math.inf, K.high)}
+        return {name + self.suffix: both for name, both in ends.items()}
 
     def rows(self) -> Iterable[Row]:
         """A line for each name."""

@@ -74,7 +74,7 @@ class Parameter:
         return {self.name: value} if isinstance(value, mi.Object) else {}
 
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """(least, greatest) of what `children` returns, by name."""
+        """(least, greatest) of what `children` returns, by name: where values and derivatives are finite."""
         return {}
 
     def check(self, value: Any) -> None:
@@ -98,6 +98,7 @@ class Texture(Parameter):
     low: float = 0.0
     high: float = math.inf
     unit: str = ""  # type: ignore[misc]
+    steep: bool = False  # whether derivatives are infinite at the upper end
     kind: ClassVar[str] = "number or texture"
 
     def allowed(self) -> str:
@@ -126,8 +127,8 @@ class Texture(Parameter):
         return texture
 
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Both ends."""
-        return {self.name: (self.low, self.high)}
+        """Both ends, but not one at which derivatives are infinite."""
+        return {self.name: (self.low, math.inf if self.steep else self.high)}
 
     def get(self, props: mi.Properties, name: str) -> Any:
         """Ask Mitsuba for the texture; unbounded, since a reflectance would be limited to [0, 1]."""

@@ -12,7 +12,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from . import llvm, threads
+from . import llvm, loading, threads
 from .microfacet.albedo import directional_albedo
 from .microfacet.quadrature import RULES, rule
 
@@ -32,6 +32,7 @@ def _switched(_old: str | None, new: str | None) -> None:
 
     llvm.guard(new)
     threads.ensure_worker()
+    loading.PLUGINS.update(MODELS, TEXTURES, PHASES)
     for name, model in MODELS.items():
         mi.register_bsdf(name, _bsdf(model, new))
     for name, model in TEXTURES.items():

@@ -97,6 +97,15 @@ def test_meshes_and_height_fields(asperity, tmp_path):
     assert Measurement.load("waves.npz").about["geometry"]["spacing"] == [0.1, 0.1]
 
 
+def test_a_tilted_height_field_is_levelled_if_asked(asperity):
+    np.save("plane.npy", np.arange(16.0)[:, None] * np.ones(8))
+    tilted = ("measure", "heightfield", "plane.npy", "--spacing", "1", *QUICK)
+    refused = asperity(*tilted)
+    assert refused.exit_code != 0 and "--level" in refused.output and "--periodic mirror" in refused.output
+    assert "plane.npy: 16 x 8 heights, the plane of slopes 0 and 1 " in works(asperity(*tilted, "--level"))
+    assert Measurement.load("plane.npz").about["geometry"]["level"] is True
+
+
 def test_a_preset_and_a_tensor_file(asperity):
     works(asperity("measure", "--preset", "gold-dust", "--set", "tau_0=0.2", *QUICK, "--tensor", "gold"))
     assert Measurement.load("gold-dust.npz").about["model"]["tau_0"] == 0.2

@@ -109,6 +109,59 @@ def models():
         def albedo(self, si):
             return super().albedo(si) * (1 + dr.sqrt(dr.maximum(super().albedo(si) - 0.5, 0)))
 
+    class DimAtNormal(Lambertian):
+        """A fifth as bright where one direction is exactly normal, both ways round: random directions never are."""
+
+        def value(self, si, wo):
+            normal = (si.wi.z == 1) | (wo.z == 1)
+            return super().value(si, wo) * dr.select(normal, 0.2, 1)
+
+    class DimFromNormal(Lambertian):
+        """The same one way only."""
+
+        def value(self, si, wo):
+            return super().value(si, wo) * dr.select(si.wi.z == 1, 0.2, 1)
+
+    class SpikeInRetroPdf(Lambertian):
+        def density(self, wi, wo):
+            return super().density(wi, wo) * dr.select(dr.all(wi == wo), 3, 1)
+
+    class NaNWithoutReflectance(Lambertian):
+        def albedo(self, si):
+            reflectance = super().albedo(si)
+            return reflectance * (reflectance / reflectance)
+
+    class DeadWhenWhite(Lambertian):
+        """Right in value, but at 1 the derivative of the limit is 0."""
+
+        def albedo(self, si):
+            return dr.clip(super().albedo(si), 0, 1)
+
+    class NegativeWhenSmooth(Lambertian):
+        """With a parameter that is no reflectance, but tells its range."""
+
+        def __init__(self, props):
+            super().__init__(props)
+            self.roughness = props.get_texture("roughness", 0.5)
+
+        def traverse(self, callback):
+            super().traverse(callback)
+            callback.put("roughness", self.roughness, mi.ParamFlags.Differentiable)
+
+        def ranges(self):
+            return {"roughness": (0.1, 0.9)}
+
+        def albedo(self, si):
+            return super().albedo(si) * (self.roughness.eval(si) - 0.2)
+
+    class ClosureInALoop(Lambertian):
+        """Right if called directly; in virtual calls Dr.Jit drops the derivative of what a loop's body captures."""
+
+        def albedo(self, si):
+            quarter = super().albedo(si) / 4
+            start = mi.UInt32(0), dr.zeros(type(quarter))
+            return dr.while_loop(start, lambda k, _: k < 4, lambda k, total: (k + 1, total + quarter))[1]
+
     class NaNPdf(Lambertian):
         def density(self, wi, wo):
             return super().density(wi, wo) / dr.select(wo.z < 0.1, dr.nan, 1.0)

@@ -102,6 +102,15 @@ def test_a_file_is_a_description_or_a_preset(tmp_path, form):
     assert mi.load_dict(preview(preset.material, **preset.preview, size=(8, 8), spp=1))
 
 
+def test_a_byte_order_mark_does_no_harm(tmp_path):
+    assert presets.read(written(tmp_path, b"\xef\xbb\xbf" + json.dumps(DIFFUSE).encode())).material == DIFFUSE
+
+
+def test_files_of_the_preview_are_found_beside_it_too(tmp_path):
+    view = presets.read(written(tmp_path, {"material": DIFFUSE, "preview": {"object": "a.ply", "env": "sky"}})).preview
+    assert view == {"object": str(tmp_path / "a.ply"), "env": "sky"}
+
+
 def test_files_are_found_beside_the_description_and_matrices_scale_them(tmp_path):
     mi.Bitmap(np.eye(2, dtype=np.float32)[:, :, None]).write(str(tmp_path / "map.exr"))
     texture = {"type": "bitmap", "filename": "map.exr", "to_uv": [[1, 0, 0], [0, 2, 0], [0, 0, 1]]}
@@ -127,11 +136,23 @@ def test_files_are_found_beside_the_description_and_matrices_scale_them(tmp_path
         ({"type": 3}, "it has no BSDF"),
         ({"material": DIFFUSE, "previw": {}}, "unknown key 'previw'. Did you mean 'preview'"),
         ({"material": DIFFUSE, "preview": {"enviroment": "sky"}}, "unknown key 'enviroment'.*Allowed: object, env"),
+        ({"material": DIFFUSE, "preview": {"object": 3}}, "preview.object is 3, not a name or the path of a file"),
+        ({"material": DIFFUSE, "preview": {"env": None}}, "preview.env is null, not a name"),
+        (b"[" * 100_000, "nested too deep"),
+        (b'{"type": "diffuse", "reflectance": NaN}', "material.reflectance is NaN: numbers have to be finite"),
+        (b'{"type": "diffuse", "reflectance": [1e999, 0, 0]}', "material.reflectance is .Infinity, 0, 0.: numbers"),
+        (
+            {"type": "diffuse", "reflectance": {"value": [[1, None]]}},
+            r"material.reflectance.value is \[\[1, null\]\]: ",
+        ),
         ({"type": "diffuse", "reflectance": None}, "material.reflectance is null"),
         ({"type": "mask", "bsdf": {"type": "diffuse", "reflectance": None}}, "material.bsdf.reflectance is null"),
         ({"type": "diffuse", "reflectance": {"type": "bitmap", "filename": "no.png"}}, "there is no file.*no.png"),
         ({"type": "diffuse", "reflectance": {"to_uv": [[1, 0], [0, 1]]}}, "reflectance.to_uv is .*not a matrix"),
         ({"type": "diffuse", "reflectance": {"to_uv": [[1, 0, "a"]] * 3}}, "reflectance.to_uv is .*not a matrix"),
+        ({"type": "diffuse", "reflectance": {"to_uv": [["1", 0, 0]] * 3}}, "reflectance.to_uv is .*not a matrix"),
+        ({"type": "diffuse", "reflectance": {"to_uv": ["100", "010", "001"]}}, "reflectance.to_uv is .*not a matrix"),
+        ({"type": "diffuse", "reflectance": {"to_uv": [[True, 0, 0]] * 3}}, "reflectance.to_uv is .*not a matrix"),
     ],
 )
 def test_bad_files_are_named(tmp_path, content, words):

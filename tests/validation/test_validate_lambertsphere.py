@@ -5,7 +5,7 @@ import pytest
 from asperity.validation import lambertsphere, report
 
 pytestmark = pytest.mark.usefixtures("rgb")
-SHORT = report.Effort(2e5, 12)
+SHORT, QUICK = report.Effort(2e5, 12), report.Effort(4e5, 16)
 
 
 @pytest.mark.parametrize(
@@ -24,3 +24,18 @@ def test_a_wrong_model_fails(wrong):
         model = lambertsphere.modelled(description | change)
         finding = report.agreement("", truth, model, 32, lambertsphere.REFIT)
         assert finding.passed is verdict, (change, finding)
+
+
+@pytest.mark.parametrize("rival", [{"type": "lambertsphere", "variant": "fast"}, {"type": "chandrasekhar"}])
+def test_the_published_rivals_fail_in_the_quick_report(monkeypatch, rival):
+    """Eq. 41, and isotropic scattering; with the model itself all passes."""
+    monkeypatch.setattr(lambertsphere, "ALBEDOS", (0.2, 0.8, 0.99))
+    assert report.passed([lambertsphere.brdf(QUICK)])
+    modelled = lambertsphere.modelled
+    monkeypatch.setattr(lambertsphere, "modelled", lambda spheres: modelled({"albedo": spheres["albedo"]} | rival))
+    assert not report.passed([lambertsphere.brdf(QUICK)])
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_too_few_paths_do_not_pass():
+    assert not report.passed([lambertsphere.brdf(report.Effort(100, 2))])

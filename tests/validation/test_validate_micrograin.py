@@ -1,14 +1,12 @@
 """The short version of `asperity validate micrograin`, and that it can fail."""
 
-import numpy as np
 import pytest
 
 import asperity  # noqa: F401  isort: skip
-from asperity.goniophotometer import Estimate
 from asperity.validation import micrograin, report
 
 pytestmark = pytest.mark.usefixtures("rgb")
-SHORT = report.Effort(4e5, 12)
+SHORT, QUICK = report.Effort(4e5, 12), report.Effort(4e5, 16)
 
 
 @pytest.mark.parametrize(
@@ -35,7 +33,7 @@ def test_section(section):
 def test_slices_at_86_degrees(figure, material, tolerance):
     found = micrograin.slices(figure, "", material, tolerance, SHORT)
     judged = [finding for finding in found.findings if finding.passed is not None]
-    assert len(judged) == len(micrograin.GRAINS) and all(finding.passed for finding in judged), judged
+    assert len(judged) == 3 * len(micrograin.GRAINS) and all(finding.passed for finding in judged), judged
 
 
 @pytest.mark.parametrize("wrong", [{"masking": "height"}, {"beta_x": 1.9}, {"tau_0": 0.21}, {"eta": 1.3, "k": 6.6}])
@@ -48,18 +46,21 @@ def test_a_wrong_model_fails(wrong):
         assert finding.passed is verdict, (change, finding)
 
 
-def test_agreement_sees_light_where_none_was_measured():
-    value, error = np.array([1.0, 0.0, 0.0]), np.array([0.001, 0.0, 0.0])
-    assert report.agreement("", Estimate(value, error), value, 32, 1e-4).passed
-    assert not report.agreement("", Estimate(value, error), np.array([1.0, 0.02, 0.02]), 32, 1e-4).passed
+@pytest.mark.parametrize("rival", [{"masking": "height"}, {"masking": "smith"}])
+@pytest.mark.parametrize(("figure", "material"), [("7", micrograin.METAL), ("8", micrograin.DIFFUSE)])
+def test_the_published_rivals_fail_in_the_quick_report(monkeypatch, figure, material, rival):
+    """Of Fig. 7 and 8 the last grains, whose rivals were hardest to tell; with the model itself all passes."""
+    monkeypatch.setattr(micrograin, "GRAINS", micrograin.GRAINS[-1:])
+    modelled = micrograin.modelled
+    for change, verdict in (({}, True), (rival, False)):
+        monkeypatch.setattr(
+            micrograin, "modelled", lambda description, *rest, c=change: modelled(description | c, *rest)
+        )
+        section = micrograin.slices(figure, "", material, micrograin.QUADRATURE, QUICK)
+        assert report.passed([section]) is verdict, section.findings
 
 
-def test_report(tmp_path):
-    figure, axes = micrograin.figures.axes("x", "y", "title")
-    axes.plot([0, 1])
-    failed = report.Finding("claim", "1.0", "0.5", False)
-    section = report.Section("Title", "Text.", [failed], [report.Table(("a", "b"), [(1, 0.123456)])], {"f": figure})
-    path = report.write("Report", "Preface.", [section], tmp_path)
-    text = path.read_text()
-    assert "| claim | 1.0 | 0.5 | **failed** |" in text and "| 1 | 0.1235 |" in text and "![f](f.png)" in text
-    assert (tmp_path / "f.png").stat().st_size > 1000 and not report.passed([section])
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("section", [micrograin.masking_by_azimuth, micrograin.distant_masking, micrograin.retro])
+def test_too_few_paths_do_not_pass(section):
+    assert not report.passed([section(report.Effort(100, 2))])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +9,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from asperity.errors import ParameterError, UnknownNameError
+from asperity.errors import ParameterError
 from asperity.files import atomically
 
 from . import console, materials, output, variants
@@ -20,12 +18,16 @@ VERDICT = {True: ("passed", "green"), False: ("failed", "bold red"), None: ("ski
 
 
 def check(
-    target: Annotated[str | None, typer.Argument(metavar="BSDF", help="A model, or any BSDF of Mitsuba.")] = None,
+    target: Annotated[str | None, typer.Argument(metavar="BSDF", help="A BSDF: ours, Mitsuba's or yours.")] = None,
     settings: materials.Settings = None,
     preset: materials.PresetName = None,
     material: materials.MaterialFile = None,
     pictures: Annotated[Path, typer.Option(help="Folder for pictures of what failed.")] = Path("asperity-check"),
     only: Annotated[list[str] | None, typer.Option(help="A check to run instead of all; repeatable.")] = None,
+    plugins: Annotated[
+        list[Path] | None,
+        typer.Option("--import", metavar="FILE.py", help="A file that registers plugins of yours; repeatable."),
+    ] = None,
     variant: variants.Variant = None,
 ) -> None:
     """Check a BSDF: sampling, reciprocity, energy, gradients and more. The exit code is 1 if a check fails."""
@@ -38,13 +40,15 @@ def check(
     else:
         description = materials.chosen(preset, material, settings).material
     with console.status("loading"):
+        from asperity.lab import checks
+        from asperity.lab import plugins as own
+
+        for path in plugins or []:
+            own.load(path)
         variants.choose(variant)
         materials.check_material(description)
-        from asperity.lab import checks
 
-    names = only or checks.NAMES
-    for unknown in set(names) - set(checks.NAMES):
-        raise UnknownNameError("check", unknown, checks.NAMES)
+    names = [checks.canonical(check) for check in only or checks.NAMES]
     with console.progress("checks") as progress:
         task = progress.add_task("", total=len(names))
         results = checks.check(
@@ -72,7 +76,6 @@ def draw(failures: list[Any], name: str, folder: Path) -> None:
     for result in failures:
         if result.evidence is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            slug = re.sub(r"\W+", "-", unicodedata.normalize("NFKD", result.name))  # chi², with a plain 2
-            with output.files(folder, Path(f"{name}-{slug}.png"), (".png",)) as [path], atomically(path) as part:
+            with output.files(folder, Path(f"{name}-{result.name}.png"), (".png",)) as [path], atomically(path) as part:
                 pictures.draw(result, part)
             typer.echo(path)

@@ -15,7 +15,6 @@ from rich.table import Table
 from asperity import __version__, llvm
 
 from . import console
-from .errors import one_line
 
 TRIALS = ("scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb")
 PATIENCE = 15  # seconds for one of them
@@ -83,6 +82,8 @@ def attempt(variant: str) -> tuple[bool, str]:
     if child.returncode < 0:
         last_words = child.stderr.strip().rpartition("\n")[2]
         return False, f"aborts ({signal.Signals(-child.returncode).name}): {last_words}"
+    from asperity.loading import one_line  # here, for the sake of `asperity --help`
+
     return child.returncode == 0, one_line(child.stderr if child.returncode else child.stdout)
 
 

@@ -7,8 +7,6 @@ import io
 import re
 import sys
 import unicodedata
-from difflib import get_close_matches
-from pathlib import Path
 from typing import Any
 
 import typer
@@ -18,14 +16,6 @@ from asperity.errors import AsperityError
 
 FAULTS = (AsperityError, RuntimeError, ImportError, OSError, MemoryError)
 """Of what was asked for, or of the machine. Mitsuba knows only RuntimeError, and ImportError for variants."""
-
-NOISE = {
-    r"\[\w+(?:\.cpp:\d+)?\] ": "",
-    r'(?:At|While loading) dictionary node "root": ': "",
-    r'(?:At|While loading) dictionary node "(.*?)": ': r"\1: ",
-    r'failed to instantiate \w+ plugin of type ".*?": ': "",
-}
-"""In Mitsuba's messages, and what to say instead."""
 
 
 class OneLineErrors(TyperGroup):
@@ -53,6 +43,8 @@ class OneLineErrors(TyperGroup):
         except FAULTS as error:
             if ctx.params["debug"]:
                 raise
+            from asperity.loading import one_line  # here, for the sake of `asperity --help`
+
             cause: BaseException = error
             while "(see above)" in str(cause) and cause.__cause__:  # Dr.Jit, of the error before
                 cause = cause.__cause__
@@ -69,24 +61,3 @@ def spelt(error: UnicodeError) -> tuple[str, int]:
 
 
 codecs.register_error("spelt", spelt)
-
-
-def one_line(message: str) -> str:
-    """Mitsuba's message without what only its authors need: C++ files, plugin kinds, tracebacks of our models."""
-    head, traceback, tail = message.rpartition("Traceback (most recent call last):\n")
-    text = head + re.sub(r"\A(?:\s.*\n)*(?:[\w.]+: )?", "", tail) if traceback else tail
-    for noise, instead in NOISE.items():
-        text = re.sub(noise, instead, text)
-    text = re.sub(r'Plugin "(.*?)" not found!', lambda plugin: no_plugin(plugin[1]), text)
-    return " ".join(text.split())
-
-
-def no_plugin(name: str) -> str:
-    """What to say about a plugin that nobody has."""
-    import mitsuba as mi
-
-    from asperity.models import MODELS, PHASES, TEXTURES
-
-    mitsubas = (path.stem.removeprefix("lib") for path in (Path(mi.__file__).parent / "plugins").iterdir())
-    nearest = get_close_matches(name, [*MODELS, *TEXTURES, *PHASES, *mitsubas], n=1)
-    return f"there is no plugin {name!r}." + (f" Did you mean {nearest[0]!r}?" if nearest else "")

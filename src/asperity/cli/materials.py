@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from pathlib import Path
 from typing import Annotated, Any
@@ -56,25 +55,11 @@ def value(text: str) -> Any:
     return {"type": "rgb", "value": parsed} if colour else parsed
 
 
-def check_json(node: dict[str, Any], where: str = "") -> None:
-    """Refuse what JSON can say and Mitsuba dies of, or takes in silence: nulls, NaN, a ``type`` that is no word."""
-    for key, value in node.items():
-        name = where + key
-        if isinstance(value, dict):
-            check_json(value, f"{name}.")
-        elif value is None:
-            raise ParameterError(f"{name} is null: leave it out for its default.")
-        elif isinstance(value, float) and not math.isfinite(value):
-            raise ParameterError(f"{name} = {value}: expected a finite number.")
-        elif key == "type" and not isinstance(value, str):
-            raise ParameterError(f"{name} = {value!r}: expected the name of a plugin.")
-
-
 def check_material(material: dict[str, Any]) -> None:
     """Let the plugins check the description of a BSDF, before anything slow begins; needs a variant."""
     import mitsuba as mi
 
-    check_json(material)
-    loaded = mi.load_dict(material, parallel=False)
-    if not isinstance(loaded, mi.BSDF):
+    from asperity import loading
+
+    if not isinstance(loading.load(material), mi.BSDF):
         raise ParameterError(f"{material['type']!r} is not a material.")

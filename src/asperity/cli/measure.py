@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from asperity.goniophotometer.sensors import Sensor
 
 FORMATS, TENSORS = (".npz",), (".bsdf",)
-SHAPES = {"mesh": ("bsdf", "periodic"), "heightfield": ("spacing", "scale", "bsdf", "periodic")}
+SHAPES = {"mesh": ("bsdf", "periodic"), "heightfield": ("spacing", "scale", "bsdf", "periodic", "level", "channel")}
 """What is read from files, and the options that describe it."""
 SENSORS = {
     "hemisphere": ("cells",),
@@ -72,6 +72,8 @@ def measure(
     periodic: Annotated[str | None, typer.Option(help="How a mesh or height field goes on: wrap, or mirror.")] = None,
     spacing: Annotated[float | None, typer.Option(help="Between the samples of a height field.")] = None,
     scale: Annotated[float | None, typer.Option(help="Of the heights of a height field.")] = None,
+    level: Annotated[bool, typer.Option("--level", help="Take a height field's tilt away, by least squares.")] = False,
+    channel: Annotated[str | None, typer.Option(help="Of an image with several; its name.")] = None,
     theta: Annotated[Any, typer.Option(parser=numbers, metavar="DEGREES", help="Of the incident light.")] = "0,30,60",
     phi: Annotated[Any, typer.Option(parser=numbers, metavar="DEGREES", help="Every theta gets every phi.")] = "0",
     orders: Annotated[int | None, typer.Option(min=1, help="Highest order of scattering; all if left out.")] = None,
@@ -112,6 +114,7 @@ def measure(
     with console.status("loading"):
         variants.choose(variant)
         shape = {"bsdf": bsdf, "periodic": periodic, "spacing": spacing, "scale": scale}
+        shape |= {"level": level or None, "channel": channel}
         about: dict[str, Any] = {}
         if target in SHAPES:
             geometry = from_file(target, file, {**shape, "set": settings or None})
@@ -261,7 +264,9 @@ def from_file(kind: str, file: Path | None, options: dict[str, Any]) -> Microgeo
         return Mesh(file, **given)
     if "spacing" not in given:
         raise ParameterError("spacing: a height field needs the distance between its samples.")
-    return HeightField.load(file, **given)
+    field = HeightField.load(file, **given)
+    typer.echo(f"{file}: {field.account}")
+    return field
 
 
 def facets(text: str) -> dict[str, Any]:

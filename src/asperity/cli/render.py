@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 SIZE, SPP = (512, 512), 64
 """Of a preview: about 20 s of processor time from the prompt to the picture."""
 
-PREVIEW = ("preset", "material", "set", "object", "env", "compare")
+PREVIEW = ("preset", "material", "set", "object", "env", "compare", "crease")
 """Options that make no sense with a scene file."""
 
 NEXT = (
@@ -50,6 +51,9 @@ def render(
     compare: Annotated[
         str | None, typer.Option(metavar="PRESET", help="Show another beside, and the difference.")
     ] = None,
+    crease: Annotated[
+        float | None, typer.Option(metavar="DEGREES", help="Smooth the faces of a mesh file that meet at up to this.")
+    ] = None,
     size: Annotated[Any, typer.Option(parser=parse_size, metavar="SIZE", help="512, or 640x360.")] = None,
     spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Another seed, another noise.")] = 0,
@@ -70,7 +74,7 @@ def render(
     start = time.perf_counter()
     inputs = (scene, material, env and Path(env), object_ and Path(object_), *(settings or []), *(define or []))
     files = ctx.with_resource(output.files(out, output.NAME, output.FORMATS, force=force, inputs=inputs))
-    values = (preset, material, settings, object_, env, compare)
+    values = (preset, material, settings, object_, env, compare, crease)
     given = {name: value for name, value in zip(PREVIEW, values) if value not in (None, [])}
     if scene and given:
         raise ParameterError(f"--{', --'.join(given)}: a scene file has its own materials, objects and lights.")
@@ -109,13 +113,17 @@ def previews(given: dict[str, Any], size: tuple[int, int]) -> list[Any]:
         shown.append(materials.chosen(given["compare"], None, None))
     for one in shown:
         materials.check_material(one.material)
-    view = shown[0].preview | {name: given[name] for name in ("object", "env") if name in given}
+    view = shown[0].preview | {name: given[name] for name in ("object", "env", "crease") if name in given}
 
     import mitsuba as mi
 
     from asperity.scenes.preview import preview
 
-    return [mi.load_dict(preview(one.material, size=size, **view), parallel=False) for one in shown]
+    with warnings.catch_warnings(record=True) as warned:
+        scenes = [mi.load_dict(preview(one.material, size=size, **view), parallel=False) for one in shown]
+    for message in dict.fromkeys(str(warning.message) for warning in warned):
+        typer.echo(f"warning: {message}", err=True)
+    return scenes
 
 
 def beside(a: np.ndarray, b: np.ndarray) -> np.ndarray:

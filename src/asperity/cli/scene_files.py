@@ -9,7 +9,7 @@ from typing import Any
 
 from asperity.errors import ParameterError, UnreadableFileError, readable
 
-from .materials import check_json, value
+from .materials import value
 
 FORMATS = (".xml", ".json")
 NAME = r"[A-Za-z_]\w*"
@@ -24,17 +24,17 @@ def load(
     """The scene in a file, each ``$name`` in it replaced as ``defines`` says, and the sensor's picture resized."""
     import mitsuba as mi
 
+    from asperity import loading
     from asperity.scenes import presets
 
     if path.name in presets.names():
         raise ParameterError(f"{path.name} is a preset, not a scene file: asperity render --preset {path.name}")
     readable("scene", path, FORMATS)
-    # Mitsuba's advice for scenes with plugins in Python: it would construct them from several threads.
     if path.suffix.lower() == ".xml":
-        scene = mi.load_file(str(path), parallel=False, **(defines or {}))
+        scene = loading.load_file(path, **(defines or {}))
     else:
         mi.file_resolver().prepend(str(path.parent.resolve()))
-        scene = mi.load_dict(description(path, defines or {}), parallel=False)
+        scene = loading.load(description(path, defines or {}))
     if not isinstance(scene, mi.Scene) or not scene.sensors():
         raise UnreadableFileError("scene", path, FORMATS, "it is no scene with a sensor")
     if scene.integrator() is None:
@@ -59,6 +59,8 @@ def parse_defines(texts: list[str]) -> dict[str, str]:
 
 def description(path: Path, defines: dict[str, str]) -> dict[str, Any]:
     """The dictionary in a JSON file, ready for Mitsuba."""
+    from asperity import loading
+
     used: set[str] = set()
 
     def finished(value: Any, name: str) -> Any:
@@ -74,7 +76,7 @@ def description(path: Path, defines: dict[str, str]) -> dict[str, Any]:
         if not isinstance(content, dict):
             raise ParameterError("it is no object in braces")
         content = finished(content, "")
-        check_json(content)
+        loading.check(content)
     except json.JSONDecodeError as error:
         reason = f"line {error.lineno}, column {error.colno}: {error.msg}"
     except (ParameterError, UnicodeDecodeError, RecursionError) as error:

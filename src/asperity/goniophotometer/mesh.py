@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,12 +12,13 @@ from typing import Any, ClassVar
 import mitsuba as mi
 import numpy as np
 
-from ..errors import ParameterError, UnknownNameError, UnreadableFileError, readable
+from .. import loading
+from ..errors import ParameterError, UnknownNameError, readable
+from . import heightmap
 from .periodic import Triangles, centred, normals
 from .tile import Tile
 
 MESHES = (".ply", ".obj")
-HEIGHTS = (".npy", ".png", ".exr")
 PERIODIC = ("wrap", "mirror")
 DIFFUSE = {"type": "diffuse"}
 MARGIN = 1e-3
@@ -32,6 +33,10 @@ class Triangulated:
     bsdf: dict[str, Any]
     periodic: str
     triangles: Triangles
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What makes it: not the scene, which belongs to a process and a variant, nor what else can be made again."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}  # type: ignore[arg-type]  # dataclasses
 
     @cached_property
     def overhangs(self) -> int:
@@ -134,8 +139,10 @@ class HeightField(Triangulated):
         columns · dx x rows · dy; ``mirror`` reflects the field at its outermost rows and columns, so that it is
         2 (columns - 1) dx x 2 (rows - 1) dy
     source : where the heights come from, for the description
+    level : take the plane nearest to the heights away, by least squares
 
-    Raises ParameterError for what is out of range.
+    Raises ParameterError for what is out of range, for masked heights, and where the borders of a ``wrap`` are a cliff
+    among the steps of the map (`heightmap.cliff`).
     """
 
     heights: np.ndarray
@@ -143,12 +150,21 @@ class HeightField(Triangulated):
     bsdf: dict[str, Any] = field(default_factory=DIFFUSE.copy)
     periodic: str = "wrap"
     source: Any = None
+    level: bool = False
     kind: ClassVar[str] = "height field"
 
     def __post_init__(self):
-        object.__setattr__(self, "heights", _heights(self.heights))
+        object.__setattr__(self, "heights", heightmap.checked(self.heights))
         object.__setattr__(self, "spacing", _spacing(self.spacing))
+        if not isinstance(self.level, bool):
+            raise ParameterError(f"level = {self.level!r}: expected True or False.")
         self._check()
+        if self.periodic == "wrap":
+            heightmap.check_borders(self.surface, self.spacing)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.heights.setflags(write=False)  # a copy forgets
 
     @staticmethod
     def load(
@@ -157,24 +173,42 @@ class HeightField(Triangulated):
         scale: float = 1.0,
         bsdf: dict[str, Any] = DIFFUSE,
         periodic: str = "wrap",
+        level: bool = False,
+        channel: str | None = None,
     ) -> HeightField:
-        """Read heights from an array, .npy, or from the first channel of an image, .png or .exr.
+        """Read heights from an array, .npy, or from a channel of an image, .png or .exr.
 
         ``scale`` multiplies what the file holds. In a .png that is 0 to 1, proportional to the stored whole numbers:
-        nothing is taken for sRGB. An image's first row, its upper one, is the row of lowest y.
+        nothing is taken for sRGB. An image's first row, its upper one, is the row of lowest y. An image whose channels
+        differ needs the name of the ``channel``.
         """
-        found = readable("height field", path, HEIGHTS)
-        try:
-            values = np.load(found, allow_pickle=False) if found.suffix.lower() == ".npy" else _image(found)
-        except (OSError, ValueError, RuntimeError) as error:
-            raise UnreadableFileError("height field", found, HEIGHTS, str(error)) from error
         if not np.isfinite(scale):
             raise ParameterError(f"scale = {scale}: expected a finite number.")
-        return HeightField(_heights(values) * scale, spacing, bsdf, periodic, _content(found) | {"scale": scale})
+        values = heightmap.checked(heightmap.read(path, channel)) * scale
+        source = _content(path) | {"scale": scale} | ({} if channel is None else {"channel": channel})
+        return HeightField(values, spacing, bsdf, periodic, source, level)
+
+    @cached_property
+    def surface(self) -> np.ndarray:
+        """The heights, levelled if that is asked for."""
+        return heightmap.levelled(self.heights, self.spacing) if self.level else self.heights  # type: ignore[arg-type]
+
+    @property
+    def account(self) -> str:
+        """In a line, how the heights were made a surface without end."""
+        rows, columns = self.heights.shape
+        plane = ""
+        if self.level:
+            a, b = heightmap.slopes(self.heights, self.spacing)  # type: ignore[arg-type]
+            plane = f"the plane of slopes {a:.3g} and {b:.3g} in x and y taken away, "
+        return f"{rows} x {columns} heights, {plane}{'repeated' if self.periodic == 'wrap' else 'mirrored'}"
 
     @cached_property
     def description(self) -> dict[str, Any]:
-        """Shape and SHA-256 of the heights (float64, row by row), spacing, BSDF, how they repeat, and the source."""
+        """Shape and SHA-256 of the heights (float64, row by row), spacing, BSDF, how they repeat, and the source.
+
+        That they are levelled is said only if they are: so files of former versions go on.
+        """
         return {
             "type": self.kind,
             "shape": list(self.heights.shape),
@@ -183,12 +217,12 @@ class HeightField(Triangulated):
             "periodic": self.periodic,
             "bsdf": _plain(self.bsdf),
             "source": _plain(self.source),
-        }
+        } | ({"level": True} if self.level else {})
 
     @cached_property
     def triangles(self) -> Triangles:  # type: ignore[override]
         """The grid; if it wraps, with the first row and column once more at its end."""
-        z = np.pad(self.heights, (0, 1), mode="wrap") if self.periodic == "wrap" else self.heights
+        z = np.pad(self.surface, (0, 1), mode="wrap") if self.periodic == "wrap" else self.surface
         rows, columns = z.shape
         step = np.asarray(self.spacing)
         size = np.array([*(step * (columns - 1, rows - 1)), np.ptp(z)])
@@ -203,7 +237,7 @@ class HeightField(Triangulated):
 def _bsdf(description: dict[str, Any]) -> Any:
     """The BSDF; Mitsuba's complaints become ours."""
     try:
-        bsdf = mi.load_dict(description)
+        bsdf = loading.load(description)
     except Exception as error:  # plugins in Python raise whatever they like
         raise ParameterError(f"bsdf = {description}: {error}") from error
     if not isinstance(bsdf, mi.BSDF):
@@ -232,26 +266,6 @@ def _mirrored(quarter: Triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return vertices, np.concatenate(faces), np.tile(quarter.uv, (4, 1))
 
 
-def _heights(values: Any) -> np.ndarray:
-    """A copy of its own of a 2-D array of finite numbers."""
-    try:
-        if np.iscomplexobj(values):
-            raise TypeError("they are complex")
-        heights = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise ParameterError(f"heights: expected a 2-D array of real numbers ({error}).") from error
-    if heights.ndim != 2 or min(heights.shape) < 2:
-        raise ParameterError(f"heights: expected a 2-D array, at least 2 x 2; its shape is {heights.shape}.")
-    wrong = np.argwhere(~np.isfinite(heights))
-    if len(wrong):
-        row, column = wrong[0]
-        raise ParameterError(
-            f"heights[{row}, {column}] = {heights[row, column]}: expected finite numbers; {len(wrong)} are not."
-        )
-    heights.setflags(write=False)
-    return heights
-
-
 def _spacing(given: Any) -> tuple[float, float]:
     """Along x and y."""
     try:
@@ -263,30 +277,11 @@ def _spacing(given: Any) -> tuple[float, float]:
     return dx, dy
 
 
-def _image(path: Path) -> np.ndarray:
-    """The first channel of an image, as stored; whole numbers are scaled to [0, 1]."""
-    bitmap = mi.Bitmap(str(path))
-    bitmap.set_srgb_gamma(False)
-    values = np.array(bitmap.convert(bitmap.pixel_format(), mi.Struct.Type.Float32, srgb_gamma=False))
-    return values[..., 0] if values.ndim == 3 else values
-
-
 def _read(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Vertices (n, 3), faces (m, 3) and texture coordinates (n, 2), if there are any, of a mesh that has some."""
-    try:
-        mesh = mi.load_dict({"type": path.suffix[1:].lower(), "filename": str(path), "face_normals": True})
-    except RuntimeError as error:
-        raise UnreadableFileError("mesh", path, MESHES, str(error)) from error
+    mesh = loading.mesh(path, face_normals=True)
     parameters = mi.traverse(mesh)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
-    if not len(faces):
-        raise ParameterError(f"mesh {path.name}: it has no faces.")
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-    wild = np.flatnonzero(faces.max(axis=1) >= len(vertices))
-    if len(wild):
-        raise ParameterError(
-            f"mesh: face {wild[0]} is of vertices {faces[wild[0]].tolist()}, and there are {len(vertices)}; "
-            f"{len(wild)} such faces."
-        )
     uv = np.array(parameters["vertex_texcoords"]).reshape(-1, 2) if mesh.has_vertex_texcoords() else None
     return vertices, faces, uv

@@ -5,9 +5,11 @@ Maps and slices show f |cos θo|, its mean over each cell. Where channels differ
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import singledispatch
 from typing import Any, NamedTuple
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, SubFigure
 
+from ..errors import ParameterError
 from ..lab import evaluate
 from .measurement import Estimate, Measurement, estimate
 from .sensors import Hemisphere, Points, Sensor, Window, directions
@@ -57,6 +60,9 @@ def draw(measured: Measurement, model: dict[str, Any] | None = None) -> Figure:
 
     ``model`` is the description of a BSDF to draw as well; it needs a variant with the measurement's channels.
     """
+    if model is not None:
+        _check_channels(measured)
+        measured = replace(measured, about=measured.about | {"model": model})  # lines are named by it
     several = len(np.unique(measured.incident[:, 0])) > 1
     heights = [3.4] * len(measured.incident) + [3.0] * several
     figure = Figure(figsize=(13, sum(heights) + 0.2), dpi=150, layout="constrained")
@@ -288,6 +294,17 @@ def model_means(measured: Measurement, k: int, bsdf: Any, cells: np.ndarray, wei
     wo = measured.sensor.directions(measured.wi[k], STEPS)[cells]  # (bins, n, steps², 3)
     means = evaluate.cell_means(bsdf, measured.wi[k], wo, measured.wavelengths)
     return (means * weights).sum(axis=-1).T
+
+
+def _check_channels(measured: Measurement) -> None:
+    """Raise ParameterError if a model has other channels, in the variant in use, than what was measured."""
+    names = measured.about["channels"]
+    spectral, count = measured.wavelengths is not None, dr.size_v(mi.UnpolarizedSpectrum)
+    if (spectral, len(names)) != (mi.is_spectral, count):
+        raise ParameterError(
+            f"variant {mi.variant()}: a model has {count} {'wavelengths' if mi.is_spectral else 'channels'} there, and "
+            f"{', '.join(names)} were measured. Choose a variant like that of the measurement."
+        )
 
 
 def disc(axes: Axes, theta: float, phi: float) -> None:

@@ -58,7 +58,8 @@ def trace(
     piece: Piece, sensor: Sensor, wi: np.ndarray, settings: Settings, seed: np.random.SeedSequence, lanes: int
 ) -> np.ndarray:
     """Shoot ``lanes`` paths from ``wi``; return their energy in units: (orders, cells + EXTRA, channels)."""
-    rays, ctx = piece.rays(settings.wavelengths or VISIBLE), mi.BSDFContext()
+    rays = piece.rays(settings.wavelengths or VISIBLE)
+    ctx = mi.BSDFContext(mi.TransportMode.Importance)  # energy; radiance would change by eta² at every refraction
     rng, corner = generator(seed, lanes)
     frame = mi.Frame3f(*(opaque(mi.Vector3f, *axis) for axis in sensor.axes(wi)))
     # A sensor itself must not become a variable of the loop.

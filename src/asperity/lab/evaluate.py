@@ -13,23 +13,26 @@ import mitsuba as mi
 import numpy as np
 from scipy.stats import qmc
 
+from asperity import loading
+from asperity.errors import ParameterError
+
 SHORTEST, LONGEST = 400.0, 700.0
 """nm. Spectral variants evaluate at wavelengths between these."""
 
 
 def active_variant() -> str:
-    """Return the variant in use; complain if none is."""
+    """Return the variant in use; raise ParameterError if none is."""
     if mi.variant() is None:
-        raise RuntimeError('no Mitsuba variant is set: call mitsuba.set_variant("llvm_ad_rgb"), say, first')
+        raise ParameterError('no Mitsuba variant is set: call mitsuba.set_variant("llvm_ad_rgb"), say, first')
     return str(mi.variant())
 
 
 def load(description: dict[str, Any] | mi.BSDF) -> mi.BSDF:
-    """Return the BSDF that a dictionary describes, or the BSDF itself if it is one already."""
+    """Return the BSDF that a dictionary describes, or the BSDF itself if it is one already; raise ParameterError."""
     variant = active_variant()
-    bsdf = mi.load_dict(description) if isinstance(description, dict) else description
+    bsdf = loading.load(description) if isinstance(description, dict) else description
     if not isinstance(bsdf, mi.BSDF):
-        raise TypeError(f"expected a BSDF of variant {variant} or the dictionary of one, got {bsdf!r:.200}")
+        raise ParameterError(f"expected a BSDF of variant {variant} or the dictionary of one, got {bsdf!r:.200}")
     return bsdf
 
 
@@ -136,6 +139,43 @@ def hard_pairs(seed: int = 0) -> tuple[mi.Vector3f, mi.Vector3f]:
             wi.append(hard)
             wo.append(moved / np.linalg.norm(moved, axis=1, keepdims=True))
     return vectors(np.concatenate(wi)), vectors(np.concatenate(wo))
+
+
+def special_pairs(both_sides: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """Return pairs wi, wo (n, 3) that formulas treat apart, exactly so in float32; the horizon is not among them.
+
+    Either is normal, or lies on an axis; or both are coplanar, at right angles, equal, mirrored by the normal or by an
+    axis; and all of that straight through the surface. With ``both_sides``, wi may come from below.
+    """
+    cosines = np.cos(np.radians([7, 23, 45, 60, 77.1, 89.9]))
+    axes = np.array([[1, 0], [0, 1], [-1, 0], [0, -1], *np.array([[0.8, 0.6], [-0.28, 0.96]])])
+    generic = np.array([[0.48, 0.6, 0.64], [-0.36, 0.48, 0.8], [0.64, -0.768, 0.024]])
+    turns = ((1, 0), (-1, 0), (0, 1), (0, -1))  # cosine and sine of 0, 180, 90 and 270 degrees
+    special = [(axis, z) for axis in axes for z in cosines]
+    normal = np.array([0.0, 0.0, 1.0])
+    wi, wo = [normal], [normal]
+    for axis, z in special:
+        w = raised(axis, z)
+        others = [normal, *generic, w * [1, -1, 1], w * [-1, 1, 1]]
+        others += [raised((c * axis[0] - s * axis[1], s * axis[0] + c * axis[1]), y) for c, s in turns for y in cosines]
+        wi += [w] * len(others)
+        wo += others
+    i, o = (np.array(pairs, dtype=np.float32) for pairs in (wi + wo, wo + wi))
+    i, o = np.concatenate([i, i]), np.concatenate([o, o * [1, 1, -1]])
+    return (np.concatenate([i, i * [1, 1, -1]]), np.concatenate([o, o * [1, 1, -1]])) if both_sides else (i, o)
+
+
+def raised(azimuth: Any, z: float) -> np.ndarray:
+    """Return the direction of cosine ``z`` over a horizontal unit vector."""
+    return np.array([*(np.sqrt(1 - z * z) * np.asarray(azimuth)), z])
+
+
+def at_pairs(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = None) -> np.ndarray:
+    """Return f |cos θo| of every channel and the pdf (channels + 1, n), for pairs of directions (n, 3)."""
+    si, out = interaction(vectors(wi), len(wi), wavelengths), vectors(wo)
+    value = mi.unpolarized_spectrum(bsdf.eval(mi.BSDFContext(), si, out))
+    density = bsdf.pdf(mi.BSDFContext(), si, out)
+    return np.concatenate([to_numpy(value, len(wi)), to_numpy(density, len(wi))])
 
 
 def vectors(directions: np.ndarray) -> mi.Vector3f:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from asperity.errors import ParameterError
 from asperity.lab.checks import Curves, Histogram, Result, Violations
 
 MOST_POINTS = 20_000  # more only cover each other
@@ -17,7 +18,7 @@ MOST_POINTS = 20_000  # more only cover each other
 def draw(result: Result, path: str | Path) -> None:
     """Write a PNG of what ``result`` measured."""
     if result.evidence is None:
-        raise ValueError(f"check {result.name!r} measured nothing that can be drawn")
+        raise ParameterError(f"check {result.name!r} measured nothing that can be drawn")
     figure = Figure(figsize=(12, 4.5), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     verdict = {True: "passed", False: "failed", None: "skipped"}[result.passed]

@@ -1,4 +1,4 @@
-"""The objects a material is shown on: a turned chess pawn, a torus knot, a sphere, or a file of the user's.
+"""The objects a material is shown on: a turned chess pawn, a torus knot, a sphere.
 
 They fit a box of about 2.4 units, stand on z = 0 and are centred on the z axis. The meshes are made by formula, in
 plain NumPy, with exact normals and with texture coordinates that anisotropic materials can follow.
@@ -6,33 +6,12 @@ plain NumPy, with exact normals and with texture coordinates that anisotropic ma
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, NamedTuple
-
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
-from asperity.errors import UnreadableFileError, readable
-
-MESH_FORMATS = (".ply", ".obj", ".serialized")
-FITTED_SIZE = 2.2
-"""Longest edge of the bounding box of a user's object, in scene units."""
-
-Array = NDArray[np.float64]
-
-
-class Mesh(NamedTuple):
-    """Arrays (N, 3), (N, 3), (N, 2), and vertex indices (M, 3) of triangles, counterclockwise seen from outside."""
-
-    vertices: Array
-    normals: Array
-    uvs: Array
-    faces: NDArray[np.uint32]
-
+from asperity.scenes.meshes import Array, Mesh
 
 PAWN_PROFILE = {
     "underside": [(0, 0), (0.25, 0), (0.5, 0), (0.66, 0), (0.73, 0), (0.755, 0.012), (0.765, 0.035)],
@@ -131,45 +110,3 @@ def lattice(rows: int, columns: int) -> tuple[NDArray[np.uint32], NDArray[np.uin
 
 
 OBJECTS = {"pawn": pawn, "knot": knot, "sphere": sphere}
-
-
-def to_mitsuba(mesh: Mesh, bsdf: dict[str, Any] | mi.BSDF) -> mi.Mesh:
-    """The mesh as a shape of the current variant."""
-    properties = mi.Properties()
-    properties["mesh_bsdf"] = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
-    shape = mi.Mesh(
-        "object",
-        vertex_count=len(mesh.vertices),
-        face_count=len(mesh.faces),
-        has_vertex_normals=True,
-        has_vertex_texcoords=True,
-        props=properties,
-    )
-    parameters = mi.traverse(shape)
-    attributes: dict[str, NDArray[Any]] = {
-        "vertex_positions": mesh.vertices,
-        "vertex_normals": mesh.normals,
-        "vertex_texcoords": mesh.uvs,
-        "faces": mesh.faces,
-    }
-    for name, array in attributes.items():
-        buffer = type(parameters[name])  # differs between the variants
-        parameters[name] = buffer(array.ravel())
-    parameters.update()
-    return shape
-
-
-def from_file(path: str | Path) -> dict[str, Any]:
-    """Description of a user's object (z up), scaled to the preview, centred, and standing on z = 0."""
-    path = readable("object", path, MESH_FORMATS)
-    description = {"type": path.suffix.lower()[1:], "filename": str(path)}
-    try:
-        box = mi.load_dict(description).bbox()
-    except RuntimeError as error:
-        raise UnreadableFileError("object", path, MESH_FORMATS, str(error)) from error
-    size, foot = box.extents(), (box.min + box.max) / 2
-    foot.z = box.min.z
-    if not 0 < dr.max(size) < float("inf"):
-        raise UnreadableFileError("object", path, MESH_FORMATS, "it has no extent")
-    fit = mi.ScalarTransform4f().scale(FITTED_SIZE / dr.max(size)).translate(-foot)
-    return {**description, "to_world": fit}

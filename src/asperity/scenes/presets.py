@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,7 +41,8 @@ def load(name: str) -> Preset:
 def read(path: str | Path) -> Preset:
     """A material file: the description of a BSDF, or a preset with the BSDF as its ``material``.
 
-    A relative ``filename`` starts at the folder of the file; ``to_uv``, which scales a texture, is a 3x3 matrix.
+    A relative ``filename``, or a file in ``preview``, starts at the folder of the file; ``to_uv``, which scales a
+    texture, is a 3x3 matrix.
     """
     path = readable("material", path, FORMATS)
     try:
@@ -47,6 +50,8 @@ def read(path: str | Path) -> Preset:
         return _preset(path, content)
     except json.JSONDecodeError as error:
         reason = f"line {error.lineno}, column {error.colno}: {error.msg}"
+    except RecursionError:
+        reason = "it is nested too deep"
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or one of our own
         reason = str(error)
     raise UnreadableFileError("material", path, FORMATS, reason)
@@ -64,14 +69,22 @@ def _preset(path: Path, content: Any) -> Preset:
     _complete(material, "material", path.parent)
     view = _object("preview", content.get("preview", {}))
     _known(view, ("object", "env"))
+    for key, value in view.items():
+        if not isinstance(value, str):
+            raise ValueError(f"preview.{key} is {_short(value)}, not a name or the path of a file")
+        view[key] = str(path.parent / value) if Path(value).suffix else value
     title, source, about = (str(content.get(key, "")) for key in ("title", "source", "about"))
     return Preset(path.stem, title or path.stem, source, about, view, material)
 
 
 def _object(name: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise ValueError(f"{name} is {json.dumps(value)[:40]}, not an object in braces")
+        raise ValueError(f"{name} is {_short(value)}, not an object in braces")
     return value
+
+
+def _short(value: Any) -> str:
+    return json.dumps(value)[:40]
 
 
 def _known(given: dict[str, Any], allowed: tuple[str, ...]) -> None:
@@ -90,19 +103,32 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _complete(node: dict[str, Any], where: str, folder: Path) -> None:
-    """Resolve file names and matrices, in place, and refuse nulls, on which Mitsuba dies."""
+    """Resolve file names and matrices, in place, and refuse nulls, on which Mitsuba dies, and what is not finite."""
     for key, value in node.items():
         name = f"{where}.{key}"
-        if value is None:
-            raise ValueError(f"{name} is null: leave it out for its default")
         if isinstance(value, dict):
             _complete(value, name, folder)
-        elif key == "filename":
+            continue
+        for x in _leaves(value):
+            if x is None:
+                raise ValueError(f"{name} is {_short(value)}: leave null out, for the default")
+            if isinstance(x, float) and not math.isfinite(x):
+                raise ValueError(f"{name} is {_short(value)}: numbers have to be finite")
+        if key == "filename":
             node[key] = str((folder / str(value)).resolve())  # so that `asperity show --json` may be read elsewhere
             if not Path(node[key]).is_file():
                 raise ValueError(f"{name}: there is no file {node[key]!r}")
         elif key == "to_uv":
             node[key] = _matrix(name, value)
+
+
+def _leaves(value: Any) -> Iterator[Any]:
+    """The values in lists nested in each other."""
+    if isinstance(value, list):
+        for x in value:
+            yield from _leaves(x)
+    else:
+        yield value
 
 
 def _matrix(name: str, value: Any) -> Any:
@@ -111,6 +137,8 @@ def _matrix(name: str, value: Any) -> Any:
 
     try:
         (a, b, c), (d, e, f), (g, h, i) = value
+        if any(type(x) not in (int, float) for x in (a, b, c, d, e, f, g, h, i)):
+            raise TypeError
         return Matrix3f64(a, b, c, d, e, f, g, h, i)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} is {json.dumps(value)[:40]}, not a matrix of three rows of three numbers") from None
+        raise ValueError(f"{name} is {_short(value)}, not a matrix of three rows of three numbers") from None

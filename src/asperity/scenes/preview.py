@@ -9,8 +9,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import UnknownNameError, UnreadableFileError, readable
-from asperity.scenes.objects import MESH_FORMATS, OBJECTS, from_file, to_mitsuba
+from asperity import loading
+from asperity.errors import ParameterError, UnknownNameError, UnreadableFileError, readable
+from asperity.scenes import meshes
+from asperity.scenes.objects import OBJECTS
 
 Description = dict[str, Any]
 Map = NDArray[np.floating]
@@ -43,11 +45,13 @@ def preview(
     spp: int = 64,
     seed: int = 0,
     integrator: Description | None = None,
+    crease: float | None = None,
 ) -> Description:
     """Description, for the current variant, of a scene that shows ``material`` on an object.
 
     ``object`` is one of OBJECTS or a mesh file; ``env`` one of ENVIRONMENTS or an environment map. A file's
-    light is exposed but keeps its colour, and z is up. ``integrator`` replaces the path tracer.
+    light is exposed but keeps its colour, and z is up. ``integrator`` replaces the path tracer. ``crease`` is the angle
+    in degrees up to which the faces of a mesh file are smoothed; see `meshes.from_file`.
     """
     return {
         "type": "scene",
@@ -56,17 +60,19 @@ def preview(
         "sensor": camera(size, spp, seed),
         "ground": ground(),
         "environment": environment(env),
-        "object": shown(object, material),
+        "object": shown(object, material, crease),
     }
 
 
-def shown(name: str | Path, material: Description) -> Any:
+def shown(name: str | Path, material: Description, crease: float | None = None) -> Any:
     """The object, as a shape."""
     if isinstance(name, str) and name in OBJECTS:
-        return to_mitsuba(OBJECTS[name](), material)
-    if Path(name).suffix:
-        return {**from_file(name), "bsdf": material}
-    raise UnknownNameError("object", str(name), [*OBJECTS, *(f"FILE{suffix}" for suffix in MESH_FORMATS)])
+        if crease is not None:
+            raise ParameterError(f"crease = {crease}: the {name} has normals of its own. It is for mesh files.")
+        return meshes.to_mitsuba(OBJECTS[name](), material)
+    if isinstance(name, (str, Path)) and Path(name).suffix:
+        return meshes.to_mitsuba(meshes.from_file(name, crease), material)
+    raise UnknownNameError("object", str(name), [*OBJECTS, *(f"FILE{suffix}" for suffix in meshes.FORMATS)])
 
 
 def camera(size: tuple[int, int], spp: int, seed: int) -> Description:
@@ -112,7 +118,7 @@ def environment(name: str | Path) -> Description:
         azimuth, contrast = MAPS[name]
         radiance = read_map(Path(__file__).with_name("environments") / f"{name}.exr") ** contrast
         return lit_by(radiance / irradiance(radiance), azimuth)  # per channel: a white balance
-    if Path(name).suffix:
+    if isinstance(name, (str, Path)) and Path(name).suffix:
         return lit_by(read_map(Path(name)))
     raise UnknownNameError("environment", str(name), [*ENVIRONMENTS, *(f"FILE{suffix}" for suffix in MAP_FORMATS)])
 
@@ -134,8 +140,9 @@ def read_map(path: Path) -> Map:
     """Radiance (height, width, 3) of an environment map in longitude and latitude."""
     what = "environment map"
     readable(what, path, MAP_FORMATS)
+    bitmap = loading.image(path)
     try:
-        bitmap = mi.Bitmap(str(path)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
+        bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
     except RuntimeError as error:
         raise UnreadableFileError(what, path, MAP_FORMATS, str(error)) from error
     radiance = np.maximum(np.array(bitmap), 0)  # filters that resize maps ring below zero

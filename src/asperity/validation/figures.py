@@ -40,7 +40,7 @@ def slices(title: str, sensor: Sensor, truth: Estimate, models: dict[str, np.nda
     figure.suptitle(title)
     value, error = truth.value[0], truth.error[0]
     known = error < 0.1 * value
-    low, high = value[known].min(), value[known].max()
+    low, high = (value[known].min(), value[known].max()) if known.any() else (1e-3, 1.0)
     grid = figure.subplots(2, 1 + len(models), sharex=True, sharey=True)
     extent = (0, 360, 0, 1)
 
@@ -73,7 +73,7 @@ def slices(title: str, sensor: Sensor, truth: Estimate, models: dict[str, np.nda
         errors = show(
             place,
             relative,
-            f"relative error, mean {np.nanmean(np.abs(relative)):.1%}",
+            f"relative error, mean {np.abs(relative[known]).mean():.1%}" if known.any() else "too few paths",
             cmap="RdGy_r",
             vmin=-0.2,
             vmax=0.2,

@@ -58,31 +58,41 @@ class Effort(NamedTuple):
     seed: int = 0
     tick: Callable[..., None] = lambda *_: None
 
+    def at_least(self, paths: float) -> Effort:
+        """As many, or these where fewer would tell nothing."""
+        return self._replace(paths=max(self.paths, paths))
+
 
 def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float) -> Finding:
     """Whether all numbers of a model lie within the truth's standard errors, and a relative ``tolerance`` of its own.
 
     Standard errors come from ``tiles`` tiles, so deviations follow Student's t with one degree of freedom less.
     Numbers that were measured to worse than a tenth are too few hits for that: they are compared as one, by their sum.
+    If there are no others the claim cannot be judged. It has not passed then: a report must not vouch for it.
     """
     value, error, model = (np.ravel(a).astype(float) for a in (*truth, np.broadcast_to(model, truth.value.shape)))
     allowed = tolerance * np.abs(model)
     good = error < 0.1 * np.abs(value)
     if not good.any():
-        raise ValueError(f"{claim}: nothing was measured to a tenth; more paths are needed")
+        return Finding(claim, "too few paths to judge", "one number known to a tenth", False)
     gap = np.maximum(np.abs(value - model) - allowed, 0)[good]
     limit = float(stats.t.isf((1 - (1 - SIGNIFICANCE) ** (1 / (CLAIMS * good.sum()))) / 2, tiles - 1))
-    worst = float(np.max(gap / error[good]))
+    worst = float(np.max(np.where(gap == 0, 0, gap / np.maximum(error[good], 1e-30))))  # tiles may all agree
     # Errors of cells are all but independent; if they were not, their sum's would be at most the sum of theirs.
     rest = abs(value[~good].sum() - model[~good].sum()) - allowed[~good].sum()
     rest_limit = limit * np.sqrt(np.square(error[~good]).sum()) + 1e-4 * model.sum()
-    mean = np.average(np.abs(value - model)[good] / np.abs(model[good]), weights=model[good])
+    mean = np.abs(value - model)[good].sum() / value[good].sum()
     return Finding(
         claim,
         f"mean error {mean:.2%} in {good.sum()} numbers; worst {worst:.1f} standard errors",
         f"{limit:.1f} standard errors beyond {tolerance:.2%}",
         bool(worst <= limit and rest <= rest_limit),
     )
+
+
+def told_apart(claim: str, ours: Finding, rival: Finding) -> Finding:
+    """That bounds within which a model is right refuse a rival. If not, too few paths were traced to tell the two."""
+    return Finding(claim, rival.measured, f"more than {rival.bound}", bool(ours.passed and rival.passed is False))
 
 
 def passed(sections: Iterable[Section]) -> bool:

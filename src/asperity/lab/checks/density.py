@@ -87,9 +87,9 @@ def p_value(histogram: Histogram, count: int = PAIRS) -> float:
     return float(stats.chi2.sf(statistic, max(len(expected) - 1, 1)))
 
 
-def chi_square(bsdf: mi.BSDF) -> Result:
+def chi_square(bsdf: mi.BSDF, significance: float = SIGNIFICANCE) -> Result:
     """Compare the histogram of sampled directions with the pdf over the whole sphere."""
-    level = sidak(len(directions := incident(bsdf)))
+    level = sidak(len(directions := incident(bsdf)), significance)
     worst, least = None, 2.0
     for angles in directions:
         histogram = tabulate(bsdf, angles)
@@ -97,13 +97,13 @@ def chi_square(bsdf: mi.BSDF) -> Result:
             p = float(np.nan_to_num(p_value(histogram), nan=0.0))  # NaN in the pdf is no excuse
             worst, least = (histogram, p) if p < least else (worst, least)
     if worst is None:
-        return Result("chi²", None, "has only delta lobes: there is no density to compare")
+        return Result("chi2", None, "has only delta lobes: there is no density to compare")
     measured = f"p = {least:.2g} at {named(worst.incident)}, the worst of {len(directions)} directions"
     kept_fraction, integral = worst.observed.sum() / PAIRS, worst.expected.sum() / PAIRS
     if abs(kept_fraction - integral) > 0.001:
         measured += f"; keeps {kept_fraction:.1%} of its samples, where the pdf integrates to {integral:.1%}"
-    bound = f"p > {level:.2g}: a right sampler fails once in {1 / SIGNIFICANCE:.0f} (10⁶ samples, Šidák)"
-    return Result("chi²", least > level, measured, bound, worst)
+    bound = f"p > {level:.2g}: a right sampler fails once in {1 / significance:.0f} (10⁶ samples, Šidák)"
+    return Result("chi2", least > level, measured, bound, worst)
 
 
 def pdf_integral(bsdf: mi.BSDF) -> Result:
@@ -114,7 +114,7 @@ def pdf_integral(bsdf: mi.BSDF) -> Result:
     integrals /= 1_000_000
     worst = int(np.argmax(np.where(np.isnan(integrals), np.inf, integrals)))
     return Result(
-        "pdf integral",
+        "pdf-integral",
         bool(integrals[worst] <= 1.001),
         f"{integrals[worst]:.5f} at {named(directions[worst])}, the largest of {len(directions)} directions",
         "≤ 1.001: a density integrates to 1, or less if samples are lost; 0.001 for the quadrature",

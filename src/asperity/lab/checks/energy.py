@@ -28,7 +28,7 @@ class Estimate:
         return Estimate(values.mean(axis=1), values.std(axis=1) / np.sqrt(values.shape[1]))
 
 
-def energy(bsdf: mi.BSDF) -> Result:
+def energy(bsdf: mi.BSDF, significance: float = SIGNIFICANCE) -> Result:
     """Estimate the albedo: no direction may reflect and transmit more than it receives."""
     directions = [*incident(bsdf), (89.0, 160.0)]
     estimates = []
@@ -39,7 +39,7 @@ def energy(bsdf: mi.BSDF) -> Result:
         squeezed = evaluate.to_numpy(dr.select(z < 0, dr.square(samples.drawn.eta), 1), SAMPLES)
         estimates.append(Estimate.of(samples.weight * squeezed))
     mean, error = (np.array([getattr(e, name) for e in estimates]) for name in ("mean", "error"))
-    z_score = float(stats.norm.isf(sidak(mean.size)))
+    z_score = float(stats.norm.isf(sidak(mean.size, significance)))
     margin = (1 + 1e-5 + z_score * error - mean).min(axis=1)
     worst = int(np.argmin(margin))
     return Result(
@@ -47,7 +47,7 @@ def energy(bsdf: mi.BSDF) -> Result:
         bool(margin[worst] >= 0),
         f"albedo {mean[worst].max():.4f} ± {error[worst].max():.1g} at {named(directions[worst])}, "
         f"the worst of {len(directions)} directions",
-        f"≤ 1 + {z_score:.1f} standard errors (significance {SIGNIFICANCE}, Šidák) + 1e-5 for float32",
+        f"≤ 1 + {z_score:.1f} standard errors (significance {significance:.2g}, Šidák) + 1e-5 for float32",
         Curves([named(a) for a in directions], {"albedo": mean.max(axis=1)}, "albedo, largest channel", 1.0),
     )
 
@@ -77,14 +77,14 @@ def albedos(bsdf: mi.BSDF, angles: tuple[float, float], n: int = 2 * SAMPLES) ->
     }
 
 
-def furnace(bsdf: mi.BSDF) -> Result:
+def furnace(bsdf: mi.BSDF, significance: float = SIGNIFICANCE) -> Result:
     """Compare three estimates of the albedo: sampled weights, eval / pdf, eval at uniform directions."""
     directions = incident(bsdf)
     rows = [albedos(bsdf, angles) for angles in directions]
     names = list(rows[0])
     mean, error = (np.array([[getattr(row[k], f) for k in names] for row in rows]) for f in ("mean", "error"))
     pairs = ((0, 1), (1, 2), (0, 2))
-    z_score = float(stats.norm.isf(sidak(len(pairs) * mean[:, 0].size) / 2))
+    z_score = float(stats.norm.isf(sidak(len(pairs) * mean[:, 0].size, significance) / 2))
     gap = np.array([np.abs(mean[:, a] - mean[:, b]) for a, b in pairs])
     noise = np.array([z_score * np.hypot(error[:, a], error[:, b]) + 1e-4 * mean[:, a] for a, b in pairs]) + 1e-6
     pair, row, channel = np.unravel_index(np.argmax(np.nan_to_num(gap / noise, nan=np.inf)), gap.shape)

@@ -10,7 +10,7 @@ import numpy as np
 
 from asperity.lab import evaluate
 
-from .results import Result, violations
+from .results import Result, Violations, violations
 from .samples import kept
 
 
@@ -20,8 +20,8 @@ def improper(lanes: int, *values: Any) -> np.ndarray:
     return ~(np.isfinite(rows) & (rows >= 0)).all(axis=0)
 
 
-def finiteness(bsdf: mi.BSDF) -> Result:
-    """Evaluate and sample at hard directions and with extreme random numbers."""
+def improprieties(bsdf: mi.BSDF) -> dict[str, Violations]:
+    """Evaluate and sample at hard directions and with extreme random numbers; return what is bad, by its kind."""
     wi, wo = evaluate.hard_pairs()
     lanes = dr.width(wo.x)
     value, density = evaluate.eval(bsdf, wi, wo), evaluate.pdf(bsdf, wi, wo)
@@ -37,10 +37,16 @@ def finiteness(bsdf: mi.BSDF) -> Result:
     sound = (drawn.pdf > 0) & (drawn.pdf < dr.inf) & (dr.abs(dr.norm(drawn.wo) - 1) < 1e-3) & (drawn.eta > 0)
     unsound = evaluate.to_numpy(kept(bsdf, wi, drawn, weight) & ~sound, k.size)[0] > 0
     found["sample"] = violations(wi, drawn.wo, unsound, "sampled pdf or η not positive, or wo not of length 1")
+    return found
+
+
+def finiteness(bsdf: mi.BSDF) -> Result:
+    """Look for values that are not finite, or negative."""
+    found = improprieties(bsdf)
     return Result(
         "finiteness",
         not any(v.excess.size for v in found.values()),
-        "; ".join(f"{name}: {v.excess.size} bad" for name, v in found.items()) + f" of {lanes} pairs, {k.size} samples",
+        "; ".join(f"{name}: {v.excess.size} bad" for name, v in found.items()),
         "0: finite and ≥ 0 at grazing and horizontal directions, wi = wo, mirror, normal, and nearby",
         max(found.values(), key=lambda v: v.excess.size),
     )

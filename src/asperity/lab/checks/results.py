@@ -11,7 +11,7 @@ import numpy as np
 from asperity.lab import evaluate
 
 SIGNIFICANCE = 0.01
-"""Probability that a statistical check rejects a right BSDF, over all its directions together (Šidák)."""
+"""Probability that a statistical check rejects a right BSDF, over all its directions together (Šidák), by default."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class Result:
     evidence: Histogram | Violations | Curves | None = None
 
 
-def sidak(comparisons: int) -> float:
-    """Return the significance of one comparison for which all together have ``SIGNIFICANCE``."""
-    return float(1 - (1 - SIGNIFICANCE) ** (1 / comparisons))
+def sidak(comparisons: int, significance: float) -> float:
+    """Return the significance of one comparison for which all together have ``significance``."""
+    return float(1 - (1 - significance) ** (1 / comparisons))
 
 
 def violations(wi: mi.Vector3f, wo: mi.Vector3f, bad: np.ndarray, quantity: str) -> Violations:

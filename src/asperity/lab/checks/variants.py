@@ -12,6 +12,9 @@ from asperity.lab import evaluate
 
 from .results import Result, complaint
 
+OTHER_COLOURS = "require the use of a"
+"""In what Mitsuba says of a file that holds RGB only in a spectral variant, and the other way round."""
+
 
 def usable_variants() -> tuple[list[str], list[str]]:
     """Return the variants that this machine can run, and those that it cannot."""
@@ -52,7 +55,9 @@ def variants(description: dict[str, Any] | mi.BSDF) -> Result:
     if not isinstance(description, dict):
         return Result("variants", None, "needs the dictionary: an object belongs to one variant")
     usable, absent = usable_variants()
-    before, values, troubles = evaluate.active_variant(), {}, []
+    before, values = evaluate.active_variant(), {}
+    troubles: list[str] = []
+    skipped: list[str] = []
     for variant in usable:
         try:
             mi.set_variant(variant)
@@ -60,7 +65,7 @@ def variants(description: dict[str, Any] | mi.BSDF) -> Result:
             if not finite:
                 troubles.append(f"{variant}: not finite")
         except Exception as error:  # whatever a plugin raises is its trouble, and is reported
-            troubles.append(f"{variant}: {complaint(error)}")
+            (skipped if OTHER_COLOURS in str(error) else troubles).append(f"{variant}: {complaint(error)}")
         finally:
             mi.set_variant(before)
     rgb = [v for v in values if "rgb" in v]
@@ -69,7 +74,9 @@ def variants(description: dict[str, Any] | mi.BSDF) -> Result:
     return Result(
         "variants",
         not troubles and deviation < 1e-4,
-        measured + (f" ({len(absent)} need a GPU: skipped)" if absent else ""),
+        measured
+        + (f" ({len(absent)} need a GPU: skipped)" if absent else "")
+        + (f" ({len(skipped)} need other colours: skipped; {skipped[0]})" if skipped else ""),
         f"loads, finite; {' = '.join(rgb)} to 1e-4 of the largest value: same formulas, other rounding",
     )
 

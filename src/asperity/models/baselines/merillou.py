@@ -39,7 +39,7 @@ class Merillou(Mixture):
     citation = CITATION
 
     tau_0, beta, beta_x, beta_y = Micrograin.tau_0, Micrograin.beta, Micrograin.beta_x, Micrograin.beta_y
-    depth = Texture("depth of the pores over their radius", 1.0, high=1e6)
+    depth = Texture("depth of the pores over their radius", 1.0, high=1000)
     metal, base = Micrograin.metal, BSDF("what lies at the bottom of the pores; black if none")
 
     def shares(self, si, active, layer, i, o):

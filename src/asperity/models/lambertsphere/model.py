@@ -8,6 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ...loading import load
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.numerics import clamp, keep
 from ...parameters import Choice, Colour, Declared, conflict
@@ -109,7 +110,7 @@ class LambertSphere(HalfSpace):
     @classmethod
     def microgeometry(cls, description: dict[str, Any]) -> RandomWalk:
         """The random walk between spheres that a scene's description of this BSDF stands for."""
-        mi.load_dict(description, parallel=False)  # complains of what is wrong with it
+        load(description)  # complains of what is wrong with it
         return RandomWalk.of(cls.defaults() | description, set(description))
 
     def root(self, bond):

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...conductors import Conductor
 from ...errors import ParameterError
+from ...loading import load
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import Dielectric, conductor
 from ...microfacet.numerics import clamp
@@ -87,12 +88,12 @@ class Micrograin(Declared):
     citation = CITATION
     table_betas: tuple[float, float] | None = None
 
-    tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1)
+    tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1, steep=True)
     beta = Texture(
-        "height of the grains over their radius: small is flat and shiny, large is rough", 1.0, low=1e-4, high=1e4
+        "height of the grains over their radius: small is flat and shiny, large is rough", 1.0, low=1e-4, high=100
     )
-    beta_x = Texture("beta along x, instead of beta", None, low=1e-4, high=1e4)
-    beta_y = Texture("beta along y, instead of beta", None, low=1e-4, high=1e4)
+    beta_x = Texture("beta along x, instead of beta", None, low=1e-4, high=100)
+    beta_y = Texture("beta along y, instead of beta", None, low=1e-4, high=100)
     metal = Conductor("metal of the grains", "none")
     specular = Flag("whether the grains reflect at their surface; false makes them Lambertian", True)
     diffuse_reflectance = Colour("albedo of diffuse or coated grains", 0.5)
@@ -114,7 +115,7 @@ class Micrograin(Declared):
     @classmethod
     def microgeometry(cls, description: dict[str, Any]) -> ExplicitGrains:
         """The explicit grains that a scene's description of this BSDF stands for."""
-        mi.load_dict(description, parallel=False)  # complains of what is wrong with it
+        load(description)  # complains of what is wrong with it
         return ExplicitGrains.of(cls.defaults() | description, set(description))
 
     def configure(self, given: set[str]) -> None:

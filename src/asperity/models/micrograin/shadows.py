@@ -24,9 +24,10 @@ def to_sphere(w, beta_x, beta_y):
 
 
 def lift(w, beta_x, beta_y):
-    """``w`` with z raised where it needs to be, so that its cosine in sphere space is at least `GRAZING`."""
+    """``w`` raised where it needs to be, so that its cosine in sphere space is at least `GRAZING`."""
     tangent = dr.sqrt(dr.square(beta_x * w.x) + dr.square(beta_y * w.y) + 1e-14)
-    return type(w)(w.x, w.y, dr.maximum(w.z, GRAZING * tangent))
+    raised = type(w)(w.x, w.y, dr.maximum(w.z, GRAZING * tangent))
+    return raised * dr.rsqrt(dr.squared_norm(raised))
 
 
 def inclination(w):

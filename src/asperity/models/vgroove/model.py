@@ -11,6 +11,7 @@ import numpy as np
 
 from ...conductors import Conductor
 from ...errors import ParameterError
+from ...loading import load
 from ...microfacet.distributions import DISTRIBUTIONS, Profile, sample_azimuth
 from ...microfacet.fresnel import conductor
 from ...microfacet.numerics import clamp
@@ -61,7 +62,7 @@ class VGroove(Declared):
     @classmethod
     def microgeometry(cls, description: dict[str, Any]) -> ExplicitGrooves:
         """The explicit grooves that a scene's description of this BSDF stands for."""
-        mi.load_dict(description, parallel=False)  # complains of what is wrong with it
+        load(description)  # complains of what is wrong with it
         return ExplicitGrooves.of(cls.defaults() | description, set(description))
 
     def configure(self, given: set[str]) -> None:
