@@ -17,8 +17,8 @@ def bitmap(low, high):
 BAD = {
     "misspelt": ({"tau0": 0.3}, "no parameter 'tau0'. Did you mean 'tau_0'"),
     "too large": ({"tau_0": 1.5}, r"tau_0 = 1.5: expected a number or texture in \[0, 1\]"),
-    "zero": ({"beta": 0.0}, r"beta = 0.0: expected a number or texture in \[0.0001, 10000\]"),
-    "huge": ({"beta": 1e20}, r"beta = 1e\+20: expected a number or texture in \[0.0001, 10000\]"),
+    "zero": ({"beta": 0.0}, r"beta = 0.0: expected a number or texture in \[0.0001, 100\]"),
+    "huge": ({"beta": 1e20}, r"beta = 1e\+20: expected a number or texture in \[0.0001, 100\]"),
     "NaN": ({"tau_0": float("nan")}, "tau_0 = nan"),
     "infinite": ({"beta": float("inf")}, "beta = inf"),
     "word for a number": ({"tau_0": "much"}, "tau_0 = 'much'"),

@@ -14,7 +14,7 @@ import pytest
 from asperity.lab.evaluate import variates
 from asperity.microfacet.distributions import DISTRIBUTIONS, GGX, Beckmann, Profile
 from asperity.microfacet.fresnel import conductor
-from asperity.models.vgroove import fresnel, nonsymmetric
+from asperity.models.vgroove import fresnel, kaleidoscope, nonsymmetric
 from asperity.models.vgroove.bounces import needed_bounces_nonsymmetric
 from asperity.models.vgroove.kaleidoscope import Groove, Pair, bounces, exit_angle, leaving_share, symmetric_bounces
 from asperity.models.vgroove.model import VGroove, _more_numbers
@@ -114,6 +114,26 @@ def test_kaleidoscope_equals_traced_rays(tilts):
         for count_bounces in [bounces, symmetric_bounces] if left == right else [bounces]:
             k = np.asarray(count_bounces(groove, psis, offset, llvm.UInt(60)))
             assert (k != count[lit]).mean() < 2e-3  # rays that meet a rim
+
+
+def test_the_kaleidoscope_needs_its_clamps(monkeypatch):
+    """Eq. 6 as printed lets an image reflect that the ray runs away from, at a negative offset."""
+
+    def as_printed(groove, psi, m):
+        tilt = dr.select(m % 2 == 1, groove.tilt_l, groove.tilt_r)
+        return dr.sin(kaleidoscope.meeting_angle(groove, psi, m)) / dr.sin(tilt)
+
+    left, right = np.radians((80, 60))
+    groove, psis = Groove(llvm.Float64(left), llvm.Float64(right)), np.radians(np.arange(-85.0, 86.0, 10.0))
+
+    def error():
+        traced = [np.bincount(trace(left, right, psi)[0], minlength=40)[1:40] / 1000 for psi in psis]
+        shares = [[float(leaving_share(groove, llvm.Float64(psi), k)[0]) for k in range(1, 40)] for psi in psis]
+        return np.abs(np.subtract(traced, shares)).sum(1).max()
+
+    assert error() < 3e-3
+    monkeypatch.setattr(kaleidoscope, "reach", as_printed)
+    assert error() > 0.1
 
 
 def masking(left, right, psi):
