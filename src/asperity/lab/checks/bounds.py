@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import drjit as dr
 import mitsuba as mi
@@ -73,7 +74,8 @@ def bounds(bsdf: mi.BSDF) -> Result:
     wi, wo, weight = weighted_pairs(bsdf, LANES)
     virtual = Calls(pointer(bsdf), wi, wo)
     errors, bad = {}, []
-    with parameters.restored():
+    with parameters.restored(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what is unusual, as ends of ranges are
         parameters.place(parameters.initial)
         known = improper_kinds(bsdf)  # what is bad everywhere is for `finiteness` to say
         for key, end, (low, high) in cases:
