@@ -6,6 +6,7 @@ import helpers
 import mitsuba as mi
 import pytest
 
+SLOW, MORE = pytest.mark.slow, [("correlated", 0.01), ("height", 0.5), ("correlated", 0.97)]
 WHITE = {"type": "diffuse", "reflectance": 1.0}
 
 
@@ -17,16 +18,7 @@ def albedo(theta, phi=0.3, **parameters):
     "diffuse_grains", [{}, {"specular": False, "diffuse_reflectance": 1.0}], ids=["mirror", "diffuse"]
 )
 @pytest.mark.parametrize("beta", [(0.1, 0.1), (1.0, 1.0), (5.0, 5.0), (0.1, 3.0)])
-@pytest.mark.parametrize(
-    "masking, tau_0",
-    [
-        ("correlated", 0.2),
-        *(
-            pytest.param(*case, marks=pytest.mark.slow)
-            for case in [("correlated", 0.01), ("height", 0.5), ("correlated", 0.97)]
-        ),
-    ],
-)
+@pytest.mark.parametrize("masking, tau_0", [("correlated", 0.2), *(pytest.param(*case, marks=SLOW) for case in MORE)])
 def test_multiple_scattering_closes_the_furnace(rgb, diffuse_grains, beta, tau_0, masking):
     """To 0.8 %: the tables' interpolation, most of it across the seven azimuths, and 4096 points a node."""
     grains = {"tau_0": tau_0, "beta_x": beta[0], "beta_y": beta[1], "masking": masking, **diffuse_grains}
