@@ -38,3 +38,9 @@ def albedo(description, theta, phi=0.3):
     """(mean weight, its standard error, largest weight) of 2^17 samples at the angles in degrees."""
     weight = np.asarray(draw(mi.load_dict(description), towards(theta, phi))[1].x, dtype=float)
     return weight.mean(), weight.std() / N**0.5, weight.max()
+
+
+def cosine_directions(rng, n):
+    """Cosine-distributed, the horizon left out."""
+    radius, azimuth = np.sqrt(rng.uniform(0, 0.999, n)), rng.uniform(0, 2 * np.pi, n)
+    return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.sqrt(1 - radius**2)])
