@@ -55,7 +55,7 @@ def test_one_pass_is_rendered_however_early_the_signal():
     scene = mi.load_dict(
         {"type": "scene", "integrator": {"type": "path"}, "light": {"type": "constant"}, "sensor": sensor}
     )
-    [image], done = passes.average([scene], 4, 0, [signal.SIGTERM])
+    [image], done = passes.average([scene], 4, 0, interrupted=[signal.SIGTERM])
     assert done == 4 and image.min() > 0
 
 

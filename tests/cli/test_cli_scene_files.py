@@ -41,9 +41,9 @@ def test_definitions_are_put_in(rgb, files, name):
 
 
 def test_definitions_within_a_word(files):
-    (files / "scene.json").write_text('{"type": "$kind", "filename": "maps/$name-$part.png", "costs": "$"}')
-    found = scene_files.description(files / "scene.json", {"kind": "bitmap", "name": "wood", "part": "1"})
-    assert found == {"type": "bitmap", "filename": "maps/wood-1.png", "costs": "$"}
+    (files / "scene.json").write_text('{"type": "$kind", "id": "maps/$name-$part.png", "costs": "$"}')
+    found = scene_files.description(files / "scene.json", {"kind": "diffuse", "name": "wood", "part": "1"})
+    assert found == {"type": "diffuse", "id": "maps/wood-1.png", "costs": "$"}
 
 
 BAD = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import drjit as dr
@@ -129,18 +130,24 @@ class Parameters:
         return np.array([np.sum(slopes[key] * directions[key]) for key in leaves])
 
     def differences(self, quantity: Quantity, values: Values, directions: Values) -> list[Estimate]:
-        """Central differences along ``directions``, extrapolated from each pair of `STEPS`: errors are O(h⁴)."""
+        """Finite differences along ``directions``, extrapolated from each pair of `STEPS` (Richardson).
+
+        Central ones; then those of either side, which differ where a parameter is at the node of a table: any will do.
+        """
 
         def at(step: float) -> np.ndarray:
             self.place({key: value + step * directions[key] for key, value in values.items()})
             return np.array(quantity.value(), dtype=np.float64)
 
-        slopes = [(at(step) - at(-step)) / (2 * step) for step in STEPS]
-        rounding = ROUNDING * np.abs(at(0))
-        return [
-            Estimate(fine + (fine - coarse) / 3, np.abs(fine - coarse), rounding / step)
-            for coarse, fine, step in zip(slopes, slopes[1:], STEPS)
-        ]
+        middle, estimates = at(0), []
+        rights, lefts = zip(*(((at(h) - middle) / h, (middle - at(-h)) / h) for h in STEPS))
+        for h, *sides in zip(STEPS, pairwise(rights), pairwise(lefts)):
+            noise = ROUNDING * np.abs(middle) / h
+            coarse, fine = (sum(slopes) / 2 for slopes in zip(*sides))
+            estimates.append(Estimate(fine + (fine - coarse) / 3, np.abs(fine - coarse), noise))
+            doubt = np.max([np.abs(near - far) for far, near in sides], axis=0)
+            estimates += [Estimate(2 * near - far, doubt, noise) for far, near in sides]
+        return estimates
 
 
 def along(directions: Values, chosen: str) -> Values:

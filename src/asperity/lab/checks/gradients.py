@@ -83,13 +83,12 @@ class Render(NamedTuple):
 def inside(initial: Values) -> tuple[Values, Values]:
     """Return where to differentiate the parameters, and their elements' magnitudes, in which steps are counted.
 
-    0 and 1 often end a range: such elements are moved off, so that both neighbours are inside it. Other round numbers
-    often are nodes of tables, where derivatives have two sides: all are moved, by more than the finer steps.
+    0 and 1 often end a range: such elements are moved off, so that both neighbours are inside it.
     """
     values, sizes = {}, {}
     for key, numbers in initial.items():
         sizes[key] = np.where(numbers == 0, np.abs(numbers).mean() or 1, np.abs(numbers))
-        values[key] = np.where(numbers == 0, 0.02 * sizes[key], np.where(numbers == 1, 0.98, 0.993 * numbers))
+        values[key] = np.where(numbers == 0, 0.02 * sizes[key], np.where(numbers == 1, 0.98, numbers))
     return values, sizes
 
 
