@@ -26,7 +26,7 @@ def picture(bsdf, **attributes):
     sensor = {{"type": "perspective", "fov": 1, "to_world": to_world, "film": film}}
     scene = {{"type": "scene", "integrator": {{"type": "path", "max_depth": 2}}, "light": {{"type": "constant"}}}}
     scene = mi.load_dict({{**scene, "sensor": sensor, "plate": mesh}}, parallel=False)
-    return np.array(mi.render(scene, spp=64, seed=1)).mean(axis=(0, 1))
+    return np.array(mi.render(scene, spp=16, seed=1)).mean(axis=(0, 1))
 def vertex(name):
     return {{"type": "mesh_attribute", "name": name}}
 """
