@@ -26,6 +26,9 @@ def values(bsdf, wi, wo, component=0xFFFFFFFF):
     return np.array(evaluate.load(bsdf).eval(context, evaluate.interaction(wi), wo))
 
 
+NODES = np.polynomial.legendre.leggauss(400)
+
+
 def float64(values):
     return llvm.Float64(np.asarray(values, dtype=float))
 
@@ -82,7 +85,7 @@ def test_lit_and_visible_part_of_a_pore_is_what_points_count(vector):
 @pytest.mark.parametrize("tau_0", [1e-6, 0.01, 0.3, 0.97])
 def test_shares_are_integrals_over_heights(tau_0, slopes):
     """Quantiles u above 1 - tau_0 belong to grains; what blocks the base's light is above w = 1 - tau_0."""
-    nodes, weights = np.polynomial.legendre.leggauss(400)
+    nodes, weights = NODES
     u = 1 - tau_0 * (1 - nodes) / 2
     grains, base = (weights * u**slopes).sum() / 2 * tau_0, (1 - tau_0) ** (1 + slopes)
     for number in (llvm.Float, llvm.Float64):
@@ -135,15 +138,20 @@ def test_base_shows_its_share_at_normal_incidence(rgb, model, tau_0):
 
 
 @pytest.mark.xfail(strict=True, reason="lit_and_visible of shifts near 1e-6, all three: up to 11 % too little")
-def test_shallow_pores_hide_nothing_and_deep_ones_all(rgb):
+def test_shallow_pores_hide_nothing(rgb):
     wi, wo = (evaluate.uniform_hemisphere(N, seed) for seed in (3, 4))
     pores = {"type": "merillou", "tau_0": 0.4, "base": WHITE}
-    shallow, deep = (values({**pores, "depth": depth}, wi, wo, component=1) for depth in (0.0, 1e6))
+    shallow = values({**pores, "depth": 0.0}, wi, wo, component=1)
     # Depth 0 stands for SHALLOW: discs apart by d have 1 - 2 d / pi in common. Directions are lifted to the cosine
     # GRAZING alpha, with an alpha of .88 here.
     hidden = 2 / np.pi * SHALLOW * sum(1 / np.maximum(np.array(w.z), 0.88 * GRAZING) for w in (wi, wo))
     flat = 0.6 * values(WHITE, wi, wo)
     assert (np.abs(shallow - flat) <= (hidden + FLOAT32) * flat + 1e-6).all()
+
+
+def test_deep_pores_hide_all(rgb):
+    wi, wo = (evaluate.uniform_hemisphere(N, seed) for seed in (3, 4))
+    deep = values({"type": "merillou", "tau_0": 0.4, "depth": 1000.0, "base": WHITE}, wi, wo, component=1)
     assert not deep[:, np.array(wi.z) < 0.999].any()
 
 

@@ -39,7 +39,10 @@ CASES = {  # description and parameters
         ["base.eta.value"],  # by alpha, a difference is also of the directions that the base's albedo is sampled in
     ),
 }
-parametrised = pytest.mark.parametrize("case", CASES)
+SLOW = {"multiple over vgroove"}
+parametrised = pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=[pytest.mark.slow] if case in SLOW else []) for case in CASES]
+)
 
 
 def pairs():

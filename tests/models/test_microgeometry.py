@@ -19,7 +19,7 @@ COATED = {"int_ior": 1.5, "ext_ior": 1.0, "diffuse_reflectance": 0.5}
     ("model", "given", "complaint"),
     [
         ("micrograin", {"tau_0": TEXTURE}, "tau_0 = .*alike everywhere"),
-        ("micrograin", {"beta": TEXTURE}, "beta_x = .*alike everywhere"),
+        ("micrograin", {"beta": TEXTURE}, "beta = .*alike everywhere"),
         ("micrograin", {"beta_y": TEXTURE}, "beta_y = .*alike everywhere"),
         ("micrograin", {"tau_0": 1.0}, r"tau_0 = 1: .*\[0, 1\)"),
         ("micrograin", {"reflectivity": 0.9}, "reflectivity: not simulated.*material"),
@@ -34,7 +34,7 @@ COATED = {"int_ior": 1.5, "ext_ior": 1.0, "diffuse_reflectance": 0.5}
             {"variation": "normal", "material": "Au", "material_2": "Cu"},
             "variation: not simulated.*one colour",
         ),
-        ("vgroove", {"alpha": TEXTURE}, "alpha_u = .*alike everywhere"),
+        ("vgroove", {"alpha": TEXTURE}, "alpha = .*alike everywhere"),
         ("vgroove", {"alpha_u": 0.2, "alpha_v": TEXTURE}, "alpha_v = .*alike everywhere"),
         ("vgroove", {"reflectivity": 0.9}, "reflectivity: not simulated.*material"),
         ("vgroove", {"reflectivity": 0.9, "edge_tint": 0.8}, "(reflectivity|edge_tint): not simulated"),

@@ -26,7 +26,7 @@ def picture(bsdf, **attributes):
     sensor = {{"type": "perspective", "fov": 1, "to_world": to_world, "film": film}}
     scene = {{"type": "scene", "integrator": {{"type": "path", "max_depth": 2}}, "light": {{"type": "constant"}}}}
     scene = mi.load_dict({{**scene, "sensor": sensor, "plate": mesh}}, parallel=False)
-    return np.array(mi.render(scene, spp=64, seed=1)).mean(axis=(0, 1))
+    return np.array(mi.render(scene, spp=16, seed=1)).mean(axis=(0, 1))
 def vertex(name):
     return {{"type": "mesh_attribute", "name": name}}
 """
@@ -34,8 +34,8 @@ CASES = {
     "tau_0": ('{"type": "micrograin", "tau_0": %s, "base": {"type": "diffuse"}}', 0.7, "vertex_a"),
     "multiple": ('{"type": "micrograin", "scattering": "multiple", "specular": False, "tau_0": %s}', 0.7, "vertex_a"),
     "beta": ('{"type": "micrograin", "beta": %s, "base": {"type": "diffuse"}}', 0.4, "vertex_a"),
-    "alpha": ('{"type": "vgroove", "material": "Cu", "alpha": %s}', 0.8, "vertex_a"),
-    "soft grooves": ('{"type": "vgroove", "material": "Cu", "symmetric": False, "alpha": %s}', 0.8, "vertex_a"),
+    "alpha": ('{"type": "vgroove", "max_bounces": 9, "material": "Cu", "alpha": %s}', 0.8, "vertex_a"),
+    "soft grooves": ('{"type": "vgroove", "max_bounces": 9, "symmetric": False, "alpha": %s}', 0.8, "vertex_a"),
     "metal": ('{"type": "vgroove", "alpha": 1.0, "reflectivity": %s}', [0.9, 0.6, 0.3], "vertex_c"),
     "albedo": ('{"type": "lambertsphere", "albedo": %s}', [0.9, 0.6, 0.3], "vertex_c"),
     "sigma": ('{"type": "orennayar", "sigma": %s}', 40.0, "vertex_a"),
@@ -52,12 +52,11 @@ def run(code, variant):
 
 @pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
 def test_vertices_give_what_constants_give(variant):
-    """With the same samples; V-grooves may follow more bounces of vertices, which nobody can look at: 0.1 %."""
-    names = [name for name in CASES if not (variant == "scalar_rgb" and name == "soft grooves")]  # minutes
+    """With the same samples, hence to rounding; by default, V-grooves would follow more bounces of vertices."""
     code = ""
-    for bsdf, value, name in (CASES[name] for name in names):
+    for bsdf, value, name in CASES.values():
         constant = value if isinstance(value, float) else {"type": "rgb", "value": value}
         code += f"print(*picture({bsdf % f'vertex({name!r})'}, {name}={value!r}), *picture({bsdf % repr(constant)}))\n"
     vertices, constants = run(code, variant).reshape(-1, 2, 3).swapaxes(0, 1)
-    np.testing.assert_allclose(vertices, constants, rtol=2e-3)
+    np.testing.assert_allclose(vertices, constants, rtol=1e-4)
     assert (constants > 0.05).all()

@@ -1,0 +1,34 @@
+"""The quadrature over Lambertian grains."""
+
+import asperity  # noqa: F401  isort: skip
+import drjit.llvm.ad as llvm
+import numpy as np
+import pytest
+from helpers import directions, unit
+
+from asperity.models.micrograin import diffuse
+from asperity.models.micrograin.diffuse import lambertian
+from asperity.models.micrograin.grains import density
+from asperity.models.micrograin.shadows import Shadows
+
+
+@pytest.mark.parametrize("closed", [True, False], ids=["isotropic", "anisotropic"])
+def test_diffuse_quadrature_is_within_half_a_percent(monkeypatch, closed):
+    """Against 128 heights and 32 azimuths: 99.8 % of random inputs, and all that are brighter than 0.05."""
+    rng, n = np.random.default_rng(7), 4000
+    i, o = directions(rng, n, 0.03), directions(rng, n, 0.03)
+    o[:, : n // 3] = unit(i + 0.05 * rng.normal(size=i.shape))[:, : n // 3]
+    o[2] = np.maximum(np.abs(o[2]), 0.03)
+    o, beta = unit(o), np.exp(rng.uniform(np.log(0.1), np.log(3.2), (2, n)))
+    beta_x, beta_y = (llvm.Float64(b) for b in (beta[[0, 0]] if closed else beta))
+    arguments = density(llvm.Float64(rng.uniform(0.03, 0.95, n))), beta_x, beta_y, llvm.Array3f64(i), llvm.Array3f64(o)
+
+    def value():
+        return np.asarray(lambertian(*arguments, Shadows.union, closed=closed).first)
+
+    ours = value()
+    monkeypatch.setattr(diffuse, "HEIGHTS", 128)
+    monkeypatch.setattr(diffuse, "AZIMUTHS", (32, 32))
+    exact = value()
+    error = np.abs(ours / exact - 1)
+    assert np.quantile(error, 0.998) < 5e-3 and error[exact > 0.05].max() < 5e-3 and error.mean() < 5e-4

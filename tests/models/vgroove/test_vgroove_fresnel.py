@@ -1,0 +1,35 @@
+"""The product of a path's Fresnel terms in closed form."""
+
+import asperity  # noqa: F401  isort: skip
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from asperity.microfacet.fresnel import conductor
+from asperity.models.vgroove import fresnel
+
+
+@pytest.mark.parametrize("material, accuracy", [("Au", 2e-3), ("Cu", 2e-3), ("Cr", 1.1e-2), ("W", 5e-3)])
+def test_closed_fresnel_product(rgb, material, accuracy):
+    """Against the product term by term: wrong by the fit of ln F in each of k bounces, and by float32 (1e-3)."""
+    metal = mi.load_dict({"type": "vgroove", "material": material}).model.metal
+    eta, k = metal.eval(dr.zeros(mi.SurfaceInteraction3f), True)
+    logarithm = fresnel.fit(lambda cos: conductor(mi.Float(cos), eta, k))
+    cosines = mi.Float(np.linspace(0, 1, 1000, dtype=np.float32))
+    fitted = dr.exp(sum(a * cosines ** (n + 1) for n, a in enumerate(logarithm)))
+    fit_error = np.abs(np.asarray(fitted / conductor(cosines, eta, k)) - 1).max()
+    assert fit_error < accuracy
+    rng, n = np.random.default_rng(5), 5000
+    for count in (2, 3, 5, 12):
+        first, last = np.sort(rng.uniform(0, np.pi, (2, n)), axis=0)
+        b, phi = (last - first) / 2 / (count - 1), (first + last) / 2
+        exact = 1
+        for j in range(1, count + 1):
+            angle = phi + (2 * j - count - 1) * b
+            exact = exact * np.asarray(conductor(mi.Float(0.9 * np.maximum(np.sin(angle), 0)), eta, k))
+        u, w, b = (fresnel.multiples(*dr.sincos(mi.Float(x))) for x in (phi - np.pi / 2, np.pi / 2 - count * b, b))
+        bends = [c * d if m % 2 else -c * z for m, ((_, c), (z, d)) in enumerate(zip(u, w), 1)]
+        e = fresnel.waves(logarithm, mi.Float(0.9))
+        closed = fresnel.product(e, mi.UInt32(count), mi.Bool(count % 2 == 1), bends, [c for _, c in u], b)
+        assert np.abs(np.asarray(closed) - exact).max() < count * fit_error + 1e-3
