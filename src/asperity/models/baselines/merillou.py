@@ -21,8 +21,6 @@ CITATION = """\
   year    = {2000},
   doi     = {10.1109/2945.895876}
 }"""
-NUDGE = 1e-6
-"""Radii by which discs are moved apart; that much of their area is wrong."""
 SHALLOW = 1e-5
 """Depth of the pores which they have at least: shifts of nothing have no direction, and no derivative."""
 
@@ -60,16 +58,17 @@ def lit_and_visible(a, b):
     They are the bottom itself, about the origin, and the opening's outlines, cast on the bottom along the directions i
     and o by a = depth i_xy / i_z and b alike. Exact, by Green's theorem: an arc of each circle bounds the area.
     """
-    # Discs that coincide have no directions to each other: all three are moved apart, so that they do.
-    a, b = a + type(a)(NUDGE, 0), b + type(b)(0, NUDGE)
     to_a, to_b, between = (_apart(x) for x in (a, b, b - a))
     arcs = _arc(0 * a, to_a, to_b) + (_arc(a, -to_a, between) + _arc(b, -to_b, -between))
     return dr.maximum(arcs / (2 * dr.pi), 0)
 
 
 def _apart(x):
-    """``x``, or a short vector if it has no direction: of discs far from the third, where it does not matter."""
-    return dr.select(dr.squared_norm(x) < dr.square(NUDGE) / 4, type(x)(NUDGE, 0), x)
+    """``x``, or a short vector if that has no direction: any will do for two discs that coincide.
+
+    But for two that nearly do, only their own: the three directions make a triangle.
+    """
+    return dr.select(dr.squared_norm(x) < 1e-30, type(x)(1e-6, 0), x)
 
 
 def _arc(centre, first, second):
