@@ -223,7 +223,7 @@ class Direction(Parameter):
         try:
             x, y, z = (float(part) for part in given)
         except (TypeError, ValueError) as error:
-            raise self.wrong(self.name, repr(given)) from error
+            raise self.wrong(self.name, _short(given)) from error
         length = math.hypot(x, y, z)
         if not 0 < length < math.inf:  # nor NaN
             raise self.wrong(self.name, repr([x, y, z]), where=", which has no direction")
@@ -280,8 +280,13 @@ class BSDF(Parameter):
             return None
         given = props[names[0]]
         if not isinstance(given, mi.BSDF):
-            raise self.wrong(self.name, given.class_name() if isinstance(given, mi.Object) else repr(given))
+            raise self.wrong(self.name, _short(given))
         return given
+
+
+def _short(given: Any) -> str:
+    """What was given, in a word."""
+    return given.class_name() if isinstance(given, mi.Object) else repr(given)
 
 
 def conflict(first: set[str], second: set[str], why: str = "give one or the other") -> None:
@@ -332,7 +337,7 @@ class Declared:
         nests = any(isinstance(parameter, BSDF) for parameter in declarations)
         for name in props.keys():  # noqa: SIM118
             if is_unnamed(name) and not (nests and isinstance(props[name], mi.BSDF)):
-                raise ParameterError(f"{props.as_string(name)} has no name. Allowed: {', '.join(sorted(names))}.")
+                raise ParameterError(f"{_short(props[name])} has no name. Allowed: {', '.join(sorted(names))}.")
         model = cls()
         for parameter in declarations:
             setattr(model, parameter.name, parameter.parse(props))

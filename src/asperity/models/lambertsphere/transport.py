@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from ...microfacet.numerics import clamp
+from ...microfacet.numerics import clamp, keep
 
 GRAZING = 1e-4
 ONE_BELOW = 1 - 2**-24
@@ -166,7 +166,7 @@ def published_root(bond):
     """s from k_d by Eq. 39, kept in [0, 1]: k_d is off by up to .033, 3.9 %."""
     rest = dr.maximum(1 - bond, SMALL)
     top, bottom = 1 - 1.00425 * dr.power(rest, 2.67103), 1 - 0.219924 * dr.power(rest, 2.44559)
-    return dr.sqrt(dr.clip(1 - top / bottom, SMALL, 1))
+    return dr.sqrt(keep(1 - top / bottom, SMALL, 1))
 
 
 def published_bond_albedo(s):
