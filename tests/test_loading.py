@@ -66,8 +66,8 @@ def test_ways_to_give_a_colour_pass(good):
         (None, "reflectance is null: leave it out"),
         (NAN, "reflectance = nan: expected a number, finite"),
         (10**400, "reflectance = 1000.*: expected a number, finite"),
-        ([0.1, 0.2], "reflectance = .0.1, 0.2.: expected three numbers"),
-        ([0.1, None, 0.2], "reflectance = .0.1, None, 0.2.: expected three numbers, finite"),
+        ([0.1, 0.2], "reflectance = .0.1, 0.2.: expected one word or number, or three"),
+        ([0.1, None, 0.2], "reflectance = .0.1, None, 0.2.: expected .* three numbers, finite"),
         ({}, "reflectance.type is missing"),
         ({"type": None}, "reflectance.type = null: expected a name"),
         ({"type": "ref", "id": 3}, "reflectance.id = 3: expected a name"),
@@ -364,3 +364,16 @@ def test_xml_finds_its_files_and_definitions(tmp_path):
     image(0.5)["bitmap"].write(str(tmp_path / "a.exr"))
     texture = '<texture name="reflectance" type="bitmap"><string name="filename" value="$name"/></texture>'
     assert loading.load_file(xml(tmp_path, texture), name="a.exr")
+
+
+@pytest.mark.parametrize("light", ["area", "point"])
+def test_the_name_of_a_shape_or_light_makes_no_reflectance(rgb, light):
+    bright = {"type": "spectrum", "value": [(400, 5.0), (700, 5.0)]}
+    lamp = {"type": "point", "intensity": bright} if light == "point" else {"type": "area", "radiance": bright}
+    loading.check({"type": "scene", "reflector": lamp if light == "point" else {"type": "sphere", "emitter": lamp}})
+
+
+def test_a_reflectance_in_a_texture_of_textures_is_one(rgb):
+    bright = {"type": "spectrum", "value": [(400, 5.0), (700, 5.0)]}
+    with pytest.raises(ParameterError, match=r"reflectance\.color0\.value has 5"):
+        loading.check({"type": "diffuse", "reflectance": {"type": "checkerboard", "color0": bright}})

@@ -47,6 +47,14 @@ BAD = {
         {"tau_0": {"type": "irregular", "wavelengths": "400, 500, 600", "values": ".1, .2, .3"}},
         "tau_0: a colour or spectrum, where one number is expected",
     ),
+    "coloured texture for a number": (
+        lambda: {"tau_0": {"type": "bitmap", "raw": True, "data": mi.TensorXf([0.1, 0.5, 0.9] * 4, (2, 2, 3))}},
+        "tau_0: a colour or spectrum",
+    ),
+    "colour in a texture": (
+        {"tau_0": {"type": "checkerboard", "color0": {"type": "rgb", "value": [0.1, 0.5, 0.9]}, "color1": 0.2}},
+        "tau_0: a colour or spectrum",
+    ),
     "colour for a number": ({"beta": {"type": "rgb", "value": [0.1, 0.2, 0.3]}}, "beta: a colour or spectrum"),
     "illuminant for a number": ({"beta": {"type": "blackbody", "temperature": 5000.0}}, "beta: a colour or spectrum"),
     "two bases": ({"base": {"type": "diffuse"}, "other": {"type": "diffuse"}}, "no parameter 'other'"),

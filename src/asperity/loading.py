@@ -65,6 +65,8 @@ EIGHT_BITS = (".png", ".jpg", ".jpeg", ".bmp", ".tga")
 
 REFLECTANCE = re.compile("reflect|albedo|base_color|edge_tint")
 """Parameters within [0, 1]: Mitsuba clips their spectra in RGB variants."""
+NESTING = ("checkerboard", "settled")
+"""Textures of textures, which are reflectances if these are."""
 
 TRACEBACK = "Traceback (most recent call last):\n"
 NOISE = {
@@ -265,7 +267,7 @@ def _walk(node: Any, where: str, above: tuple[Any, ...], reflectance: bool) -> N
     for key, value in node.items():
         if not isinstance(key, str):
             raise ParameterError(f"{where}{key!r}: expected a word as the name of a parameter.")
-        colour = reflectance or bool(REFLECTANCE.search(key))
+        colour = reflectance if node.get("type") in NESTING else bool(REFLECTANCE.search(key))
         if isinstance(value, dict):
             _walk(value, f"{where}{key}.", (*above, node), colour)
         elif key not in ("type", "id", "filename") and not (node.get("type") in ("rgb", "spectrum") and key == "value"):
@@ -281,8 +283,9 @@ def _value(value: Any, name: str, reflectance: bool) -> None:
     if value is None:
         raise ParameterError(f"{name} is null: leave it out for its default.")
     if isinstance(value, (list, tuple)):
-        if _finite(value, name, "three numbers").shape != (3,):
-            raise ParameterError(f"{name} = {short(value)}: expected three numbers.")
+        expected = "one word or number, or three numbers"
+        if _finite(value, name, expected).shape != (3,):
+            raise ParameterError(f"{name} = {short(value)}: expected {expected}.")
     elif isinstance(value, Real) and not isinstance(value, bool):
         _finite(value, name, "a number")
     elif re.search("Transform|Matrix", type(value).__name__):

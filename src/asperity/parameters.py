@@ -120,8 +120,9 @@ class Texture(Parameter):
             texture = self.get(props, name)
         except RuntimeError as error:
             raise self.wrong(name, props.as_string(name)) from error
-        # A grey would do, but for Mitsuba, which takes any colour by its luminance.
-        if not isinstance(self, Spectrum) and not (varies(texture) or texture.class_name() == "UniformSpectrum"):
+        # Mitsuba would take any colour by its luminance.
+        constant = not varies(texture) and texture.class_name() != "UniformSpectrum"
+        if not isinstance(self, Spectrum) and (constant or any(_coloured(found) for _, found in numbers(texture))):
             raise ParameterError(f"{name}: a colour or spectrum, where one number is expected.")
         self.check(texture)
         return texture
@@ -373,6 +374,12 @@ class Declared:
         """Check values that may have been updated through ``mi.traverse``."""
         for parameter in self.declarations():
             parameter.check(getattr(self, parameter.name))
+
+
+def _coloured(found: np.ndarray) -> bool:
+    """Whether constants or texels have three channels, and not the same ones."""
+    channels = found if found.ndim == 3 else found.T
+    return bool(found.ndim > 1 and channels.shape[-1] == 3 and np.ptp(channels, axis=-1).any())
 
 
 def varies(texture: Any) -> bool:

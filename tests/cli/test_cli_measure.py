@@ -252,7 +252,7 @@ BAD = [
     (("merge", "broken.npz", "-o", "broken.npz", "--force"), "-o broken.npz: it is an input of this command"),
     (
         (*GRAINS, "--tiles", "1000000000"),
-        "tiles = 1000000000: with 3 directions of incidence, 1 orders apart, 2048 cells",
+        "tiles = 1000000000, 3 directions of incidence, 1 orders apart, 2048 cells",
     ),
     ((*GRAINS, "--cells", "4096x4096", "--apart", "1000"), "GiB of memory, and this machine has"),
     ((*GRAINS, "-o", "out.csv"), "'.csv'. Allowed: .npz"),

@@ -83,6 +83,7 @@ def test_folders_and_links(asperity, inputs, command, names):
         (*RENDER, "--env", "in/map.exr", "-o", "in/map"),
         ("render", "in/scene.json", "-o", "in/map.exr"),
         ("render", "in/scene.xml", "-o", "in/map.exr"),
+        ("render", "in/outer.xml", "-o", "in/map.exr"),
         (*RENDER, "--material", "in/material.json", "-o", "in/map.exr"),
         (*RENDER, "--set", 'reflectance={"type": "bitmap", "filename": "in/map.exr"}', "-o", "in/map.exr"),
         ("merge", "in/a.npz", "in/b.npz", "-o", "in/b.npz"),
@@ -94,11 +95,19 @@ def test_inputs_are_never_overwritten(asperity, inputs, command):
     Path("in/scene.json").write_text(json.dumps(SCENE))
     Path("in/material.json").write_text(json.dumps(SCENE["ball"]["bsdf"]))
     Path("in/scene.xml").write_text("<scene version='3.0.0'><string name='filename' value='map.exr'/></scene>")
+    Path("in/outer.xml").write_text("<scene version='3.0.0'><include filename='../in/scene.xml'/></scene>")
     Path("in/a.bsdf").write_text("mine")
     before = contents()
     result = asperity(*command, "--force")
     assert result.exit_code == 2 and "it is an input of this command" in result.stderr
     assert contents() == before
+
+
+def test_a_file_of_the_same_name_elsewhere_is_no_input(asperity, inputs):
+    Path("in/scene.json").write_text(json.dumps(SCENE))
+    Path("map.exr").write_text("old")
+    assert asperity("render", "in/scene.json", "-o", "map.exr", "--force").exit_code == 0
+    assert len(Path("map.exr").read_bytes()) > 100
 
 
 def test_an_input_may_have_the_default_name(asperity, inputs):

@@ -69,6 +69,15 @@ def test_what_is_beside_it_can_be_imported(rgb, mine):
     mi.load_dict({"type": "black_as_pitch"})
 
 
+def test_a_class_beside_it_is_defined_anew_in_every_variant(rgb, mine):
+    definition, registration = MINE.split("mi.register_bsdf")
+    (mine.parent / "definition.py").write_text(definition)
+    mine.write_text(f"import mitsuba as mi\nfrom definition import Black\nmi.register_bsdf{registration}")
+    plugins.load(mine)
+    (result,) = checks.check({"type": "black"}, only=["variants"])
+    assert result.passed, result
+
+
 @pytest.mark.parametrize(
     "name, text, message",
     [

@@ -124,6 +124,8 @@ def measure(
             geometry = of_model(about["model"])
         chosen = sensor_of(sensor, {"cells": cells, "radius": radius, "towards": towards})
         earlier = None if before is None else to_continue(before, tiles, seed)
+    if earlier is not None and not earlier.finished:
+        typer.echo(f"{before} was to have {earlier.goal.sum():.3g} paths per direction: it gets these first.")
     incident = list(product(theta, phi))
     if tensor is not None:
         from asperity.goniophotometer import tensor_file

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -111,12 +112,22 @@ def complaint(file: Path, force: bool, inputs: list[Path | str | None]) -> str |
 
 
 def is_input(file: Path, one: Path | str) -> bool:
-    """Whether a file is an input, or is named in one, or in an option."""
-    if isinstance(one, Path) and one.exists():
-        if one.samefile(file):
+    """Whether a file is an input, or is named in one, in what that includes, or in an option."""
+    waiting = [one] if isinstance(one, Path) else [Path(word) for word in re.split("[\"'=]", one)]
+    seen: set[str] = set()
+    while waiting:
+        given = waiting.pop()
+        real = os.path.realpath(given) if os.path.isfile(given) else ""
+        if not real or real in seen:
+            continue
+        if os.path.samefile(real, file):
             return True
-        one = one.read_text(errors="replace") if one.suffix.lower() in DESCRIPTIONS else ""
-    return re.search(rf"(^|[=/\\\"']){re.escape(file.name)}($|[\"'])", str(one)) is not None
+        seen.add(real)
+        if given.suffix.lower() in DESCRIPTIONS:
+            words = re.findall("[\"']([^\"']+)[\"']", given.read_text(errors="replace"))
+            beside = ((given.parent / word, Path(word)) for word in words)
+            waiting += [near if os.path.isfile(near) else far for near, far in beside]
+    return False
 
 
 def check_folder(out: Path, option: str) -> None:

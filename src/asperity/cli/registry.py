@@ -25,10 +25,11 @@ def model(name: str) -> Any:
 def described(name: str) -> Any:
     """The model, texture or phase function of that name."""
     from asperity.models import PHASES, TEXTURES
+    from asperity.scenes import presets
 
     known = models() | TEXTURES | PHASES
     if name not in known:
-        raise UnknownNameError("model, texture, phase function or preset", name, known)
+        raise UnknownNameError("model, texture, phase function or preset", name, [*known, *presets.names()])
     return known[name]
 
 

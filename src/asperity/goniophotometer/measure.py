@@ -156,9 +156,9 @@ def _check_memory(tiles: int, directions: int, orders: int, columns: int, channe
         return
     if need > there:
         raise ParameterError(
-            f"tiles = {tiles}: with {directions} directions of incidence, {orders} orders apart, {columns - EXTRA} "
-            f"cells and {channels} channels, they need {need / 2**30:.3g} GiB of memory, and this machine has "
-            f"{there / 2**30:.3g}. Measure fewer of one of these."
+            f"tiles = {tiles}, {directions} directions of incidence, {orders} orders apart, {columns - EXTRA} cells "
+            f"and {channels} channels need {need / 2**30:.3g} GiB of memory, and this machine has {there / 2**30:.3g}. "
+            "Measure fewer of one of these."
         )
 
 

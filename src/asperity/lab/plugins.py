@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import runpy
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from unittest.mock import patch
 
 import mitsuba as mi
 
@@ -32,18 +32,36 @@ def load(path: str | Path) -> None:
     if (folder := str(path.parent)) not in sys.path:
         sys.path.insert(0, folder)
 
+    helpers: set[str] = set()
+
     def run(_old: str | None, _new: str | None) -> None:
+        for name in helpers:  # they belong to a variant, too
+            sys.modules.pop(name, None)
+        others = set(sys.modules)
         try:
-            with patch.object(mi, "set_variant"):
+            with _same_variant():
                 runpy.run_path(str(path), run_name=path.stem)
         except Exception as error:
             raise ParameterError(f"{path.name} fails: {type(error).__name__}: {error}") from error
+        finally:
+            new = {name: getattr(sys.modules[name], "__file__", None) for name in sys.modules.keys() - others}
+            helpers.update(name for name, file in new.items() if file and Path(file).parent == path.parent)
 
     forget(path)
     if mi.variant() is not None:
         run(None, mi.variant())
     mi.detail.add_variant_callback(run)
     _loaded[path] = run
+
+
+@contextmanager
+def _same_variant() -> Iterator[None]:
+    """Let ``mi.set_variant`` do nothing: it would call back whoever is called."""
+    switch, mi.set_variant = mi.set_variant, lambda *_: None
+    try:
+        yield
+    finally:
+        mi.set_variant = switch
 
 
 def forget(path: str | Path) -> None:

@@ -11,11 +11,12 @@ from ..parameters import Declared, Direction, Texture
 
 
 class Settled(Declared):
-    """How much has settled on a surface: ``top`` where it faces up, ``bottom`` where it faces down.
+    """How much has settled on a surface: ``top`` where its normal points up, ``bottom`` where it points down.
 
-    Between them, a smooth step of the normal's component along ``up`` around ``threshold`` (Lucas 2024, Fig. 1b). The
-    side that is seen counts, whatever the winding of its faces. Mitsuba's ``twosided`` does not tell which side that
-    is: give it two BSDFs, the second with the opposite ``up``.
+    Between them, a smooth step of the normal's component along ``up`` around ``threshold`` (Lucas 2024, Fig. 1b). It is
+    a property of the point, not of who looks at it: else what light passes through were not reciprocal. So where faces
+    wind the other way, their normals point inward, and ``up`` has to be turned round. Where both sides of a sheet are
+    seen, give ``twosided`` two BSDFs, the second with the opposite ``up``: then its winding does not matter.
     """
 
     between = ("top", "bottom")
@@ -27,11 +28,11 @@ class Settled(Declared):
     softness = Texture("half the width of the step, in the same component", 0.6, low=1e-6, high=4)
 
     def eval(self, si: mi.SurfaceInteraction3f, active: Any) -> Any:
-        """Value at a surface point, from its world-space shading normal on the side that is seen."""
+        """Value at a surface point, from its world-space shading normal."""
         top, bottom, threshold, softness = (
             self.number(name, si, active) for name in ("top", "bottom", "threshold", "softness")
         )
-        facing = dr.mulsign(dr.dot(si.sh_frame.n, mi.Vector3f(*self.up)), si.wi.z)
+        facing = dr.dot(si.sh_frame.n, mi.Vector3f(*self.up))
         t = dr.clip((facing - threshold) / softness / 2 + 0.5, 0, 1)
         return bottom + (top - bottom) * t * t * (3 - 2 * t)
 
