@@ -318,8 +318,15 @@ def _within_unit(values: NDArray[Any], name: str, what: str) -> None:
         raise ParameterError(f"{name} has {wrong.flat[0]:g}: {what} is within [0, 1].")
 
 
-def _node(given: dict[str, Any], where: str, folder: Path = Path()) -> None:
-    """Check what a plugin needs; its files are in ``folder``, or where Mitsuba looks for them."""
+def _resolved(filename: str) -> Path:
+    """Where Mitsuba finds a file, if it does."""
+    import mitsuba as mi
+
+    return Path(str(mi.file_resolver().resolve(filename)))
+
+
+def _node(given: dict[str, Any], where: str, folder: Path | None = None) -> None:
+    """Check what a plugin needs; its files are in ``folder``, if there is one, or where Mitsuba looks for them."""
     if "type" not in given:
         raise ParameterError(f"{where}type is missing: expected the name of a plugin.")
     for name in {"type", "id"} & given.keys():
@@ -344,16 +351,15 @@ def _node(given: dict[str, Any], where: str, folder: Path = Path()) -> None:
             _texels(given, np.array(given[name]), where + name)
 
 
-def _file(given: dict[str, Any], name: str, folder: Path) -> None:
+def _file(given: dict[str, Any], name: str, folder: Path | None) -> None:
     """Find a file, and look into it where Mitsuba does not, or would die of what it finds."""
     import mitsuba as mi
 
     plugin, filename = given["type"], given["filename"]
     if not isinstance(filename, str):
         raise ParameterError(f"{name} = {short(filename)}: expected the path of a file, as a string.")
-    places = (folder / filename, Path(str(mi.file_resolver().resolve(filename))))
-    path = next((path for path in places if path.is_file()), None)
-    if path is None:
+    path = folder / filename if folder and (folder / filename).is_file() else _resolved(filename)
+    if not path.is_file():
         raise ParameterError(f"{name}: there is no file {filename!r}.")
     try:
         if plugin in ("measured", "measured_polarized"):
