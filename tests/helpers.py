@@ -1,10 +1,12 @@
 """What several test files need."""
 
 import asperity  # noqa: F401  isort: skip
+import drjit.llvm.ad as llvm
 import mitsuba as mi
 import numpy as np
 
 from asperity.lab import evaluate
+from asperity.models.lambertsphere.transport import Pair
 
 N = 1 << 17
 
@@ -44,3 +46,32 @@ def cosine_directions(rng, n):
     """Cosine-distributed, the horizon left out."""
     radius, azimuth = np.sqrt(rng.uniform(0, 0.999, n)), rng.uniform(0, 2 * np.pi, n)
     return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.sqrt(1 - radius**2)])
+
+
+def values(bsdf, wi, wo, component=0xFFFFFFFF):
+    """f cos_o of a description's component, or of all."""
+    context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), component)
+    return np.array(evaluate.load(bsdf).eval(context, evaluate.interaction(wi), wo))
+
+
+def float64(values):
+    """In double precision, whatever the variant."""
+    return llvm.Float64(np.asarray(values, dtype=float))
+
+
+def root(c):
+    """sqrt(1 - c) of albedos of particles."""
+    return float64(np.sqrt(1 - np.asarray(c, dtype=float)))
+
+
+def pair(u, v, phi):
+    """Pairs of directions of these cosines, apart by these azimuths."""
+    u, v, phi = (np.asarray(x, dtype=float).ravel() for x in np.broadcast_arrays(u, v, phi))
+    sin = np.sqrt((1 - u * u) * (1 - v * v))
+    return Pair(*map(float64, (u, v, sin * np.cos(phi), sin * sin)))
+
+
+def gauss(n):
+    """Nodes and weights in [0, 1]."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    return (x + 1) / 2, w / 2

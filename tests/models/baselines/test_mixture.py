@@ -1,36 +1,22 @@
-"""The micrograin model's competitors against the definitions that they follow from."""
+"""What the micrograin model's competitors have in common: rough metal, and a base that shows its share."""
 
 import asperity  # noqa: F401  isort: skip
-import drjit as dr
 import drjit.llvm.ad as llvm
 import mitsuba as mi
 import numpy as np
 import pytest
+from helpers import float64, values
 
 from asperity.lab import evaluate
 from asperity.microfacet.ggx import smith_lambda
-from asperity.models.baselines.deon import base_share, grain_share
-from asperity.models.baselines.merillou import SHALLOW, lit_and_visible
 from asperity.models.baselines.mixture import equivalent_roughness
 from asperity.models.micrograin.grains import density, normal_in_sphere_space
-from asperity.models.micrograin.shadows import GRAZING, to_sphere
+from asperity.models.micrograin.shadows import to_sphere
 
 N = 1 << 14
 WHITE = {"type": "diffuse", "reflectance": 1.0}
 FLOAT32 = 1e-5
 """Relative: a hundred roundings."""
-
-
-def values(bsdf, wi, wo, component=0xFFFFFFFF):
-    context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), component)
-    return np.array(evaluate.load(bsdf).eval(context, evaluate.interaction(wi), wo))
-
-
-NODES = np.polynomial.legendre.leggauss(400)
-
-
-def float64(values):
-    return llvm.Float64(np.asarray(values, dtype=float))
 
 
 def test_lambda_follows_from_the_normals():
@@ -59,49 +45,6 @@ def test_equivalent_roughness_matches_the_grains_at_the_normal():
 def test_equivalent_roughness_has_limits(tau_0, relative):
     for number in (llvm.Float, llvm.Float64):
         assert equivalent_roughness(number(tau_0), 2.0)[0] == pytest.approx(2 * relative, rel=1e-3)
-
-
-def lit_by_counting(a, b, n=2000):
-    x = (np.arange(n) + 0.5) / n * 2 - 1
-    within = [(x[:, None] - c[0]) ** 2 + (x[None, :] - c[1]) ** 2 <= 1 for c in ((0, 0), a, b)]
-    return np.logical_and.reduce(within).sum() * (2 / n) ** 2 / np.pi
-
-
-@pytest.mark.parametrize("vector", [llvm.Array2f, llvm.Array2f64])
-def test_lit_and_visible_part_of_a_pore_is_what_points_count(vector):
-    """2000² points: the outline crosses 10^4 cells at most; if each errs by half at random, that is 1.6e-5 of pi."""
-    rng = np.random.default_rng(2)
-    pairs = [scale * rng.normal(size=(2, 2)) for scale in (0.1, 0.4, 0.7, 1.0, 3.0) for _ in range(6)]
-    a, b = np.array([0.4, -0.7]), np.array([0.9, 0.0])
-    pairs += [(a, a), (0 * a, a), (0 * a, 0 * a), (a, -a), (a, 1.2 * a), (b, -b), (2.47 * a, a), (a, a + 1e-7)]
-    for i, o in pairs:
-        one, other = (vector(*map(float, w)) for w in (i, o))
-        area = lit_and_visible(one, other)[0]
-        assert area == pytest.approx(lit_by_counting(i, o), abs=6e-5)
-        assert area == pytest.approx(lit_and_visible(other, one)[0], abs=1e-6)
-
-
-@pytest.mark.parametrize("slopes", [0.0, 0.3, 5.0, 400.0])
-@pytest.mark.parametrize("tau_0", [1e-6, 0.01, 0.3, 0.97])
-def test_shares_are_integrals_over_heights(tau_0, slopes):
-    """Quantiles u above 1 - tau_0 belong to grains; what blocks the base's light is above w = 1 - tau_0."""
-    nodes, weights = NODES
-    u = 1 - tau_0 * (1 - nodes) / 2
-    grains, base = (weights * u**slopes).sum() / 2 * tau_0, (1 - tau_0) ** (1 + slopes)
-    for number in (llvm.Float, llvm.Float64):
-        depth = dr.pi * density(number(tau_0))
-        # exp(-depth slopes) amplifies the rounding of depth
-        tolerance = FLOAT32 * (1 + slopes * -np.log1p(-tau_0))
-        assert grain_share(depth, number(slopes))[0] == pytest.approx(grains, rel=tolerance)
-        assert base_share(depth, number(slopes))[0] == pytest.approx(base, rel=tolerance, abs=1e-37)
-
-
-@pytest.mark.parametrize("tau_0", [0.0, 1e-5, 0.4, 1.0])
-def test_grains_and_base_are_all_that_is_seen(tau_0):
-    """d'Eon's shares, along one direction and without masking among the grains, sum to 1."""
-    depth, slopes = dr.pi * density(llvm.Float(tau_0)), llvm.Float(0, 0.5, 30, 500)
-    seen = (1 + slopes) * grain_share(depth, slopes) + base_share(depth, slopes)
-    assert np.allclose(seen, 1, atol=1e-6)
 
 
 @pytest.mark.parametrize("model, tau_0", [("merillou", 0.3), ("merillou", 1.0), ("deon", 1.0)])
@@ -135,23 +78,6 @@ def test_base_shows_its_share_at_normal_incidence(rgb, model, tau_0):
     n = mi.Vector3f(0, 0, 1)
     base = values({"type": model, "tau_0": tau_0, "base": WHITE}, n, n, component=1)
     assert np.allclose(base, (1 - tau_0) / np.pi, atol=1e-6)
-
-
-def test_shallow_pores_hide_nothing(rgb):
-    wi, wo = (evaluate.uniform_hemisphere(N, seed) for seed in (3, 4))
-    pores = {"type": "merillou", "tau_0": 0.4, "base": WHITE}
-    shallow = values({**pores, "depth": 0.0}, wi, wo, component=1)
-    # Depth 0 stands for SHALLOW: discs apart by d have 1 - 2 d / pi in common. Directions are lifted to the cosine
-    # GRAZING alpha, with an alpha of .88 here.
-    hidden = 2 / np.pi * SHALLOW * sum(1 / np.maximum(np.array(w.z), 0.88 * GRAZING) for w in (wi, wo))
-    flat = 0.6 * values(WHITE, wi, wo)
-    assert (np.abs(shallow - flat) <= (hidden + FLOAT32) * flat + 1e-6).all()
-
-
-def test_deep_pores_hide_all(rgb):
-    wi, wo = (evaluate.uniform_hemisphere(N, seed) for seed in (3, 4))
-    deep = values({"type": "merillou", "tau_0": 0.4, "depth": 1000.0, "base": WHITE}, wi, wo, component=1)
-    assert not deep[:, np.array(wi.z) < 0.999].any()
 
 
 @pytest.mark.parametrize("model", ["merillou", "deon"])
