@@ -23,7 +23,7 @@ from .report import Effort, Finding, Section, Table, agreement, told_apart
 FLOAT32 = 1e-4
 """Relative error that is not noise."""
 QUADRATURE = 2e-3
-"""Mean relative error of the non-symmetric model's fixed quadrature: tests/models/test_vgroove.py."""
+"""Mean relative error of the non-symmetric model's fixed quadrature: tests/models/vgroove/test_nonsymmetric.py."""
 POLE = 6.0
 """Degrees about the mirror direction: cells that reach there are not judged. f has a pole that few directions miss."""
 COVER = 16
