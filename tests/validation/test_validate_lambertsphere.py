@@ -1,5 +1,7 @@
 """The short version of `asperity validate lambertsphere`, and that it can fail."""
 
+from functools import cache
+
 import pytest
 
 from asperity.validation import lambertsphere, report
@@ -16,13 +18,18 @@ def test_section(section):
     assert found.findings and all(finding.passed for finding in found.findings), found.findings
 
 
+@cache
+def truth():
+    """Walked once."""
+    return lambertsphere.walked(0.8, report.Effort(2e6, 32))
+
+
 @pytest.mark.parametrize("wrong", [{"albedo": 0.83}, {"variant": "fast"}, {"type": "chandrasekhar"}])
 def test_a_wrong_model_fails(wrong):
     description = lambertsphere.spheres(0.8)
-    truth = lambertsphere.walked(0.8, report.Effort(2e6, 32))
     for change, verdict in (({}, True), (wrong, False)):
         model = lambertsphere.modelled(description | change)
-        finding = report.agreement("", truth, model, 32, lambertsphere.REFIT)
+        finding = report.agreement("", truth(), model, 32, lambertsphere.REFIT)
         assert finding.passed is verdict, (change, finding)
 
 

@@ -19,7 +19,7 @@ from . import figures
 from .report import CLAIMS, SIGNIFICANCE, Effort, Finding, Section, Table, agreement, told_apart
 
 REFIT = 3e-3
-"""Relative error of the refitted modes below 84 degrees, for albedos from .2 on: tests/models/lambertsphere/test_transport.py."""
+"""Relative error of the refitted modes below 84 degrees, for albedos from .2 on, as tests/models/lambertsphere find."""
 FITTED_H = 1.2e-3
 """Relative error of the directional albedo: H is fitted to 6e-4, and stands twice in what is scattered repeatedly."""
 ALBEDOS = (0.2, 0.5, 0.8, 0.95, 0.99)
