@@ -6,6 +6,7 @@ import asperity  # noqa: F401  isort: skip
 from asperity.validation import micrograin, report
 
 pytestmark = pytest.mark.usefixtures("rgb")
+SLOW = pytest.mark.slow
 SHORT, QUICK = report.Effort(4e5, 12), report.Effort(4e5, 16)
 
 
@@ -15,10 +16,8 @@ SHORT, QUICK = report.Effort(4e5, 12), report.Effort(4e5, 16)
         micrograin.masking_by_azimuth,
         micrograin.distant_masking,
         micrograin.pores,
-        micrograin.bases,
         micrograin.models,
-        micrograin.retro,
-        micrograin.furnace,
+        *(pytest.param(section, marks=SLOW) for section in (micrograin.bases, micrograin.retro, micrograin.furnace)),
     ],
 )
 def test_section(section):
@@ -28,7 +27,10 @@ def test_section(section):
 
 @pytest.mark.parametrize(
     ("figure", "material", "tolerance"),
-    [("7", micrograin.METAL, micrograin.INSTRUMENT), ("8", micrograin.DIFFUSE, micrograin.QUADRATURE)],
+    [
+        ("7", micrograin.METAL, micrograin.INSTRUMENT),
+        pytest.param("8", micrograin.DIFFUSE, micrograin.QUADRATURE, marks=SLOW),
+    ],
 )
 def test_slices_at_86_degrees(figure, material, tolerance):
     found = micrograin.slices(figure, "", material, tolerance, SHORT)
@@ -47,7 +49,9 @@ def test_a_wrong_model_fails(wrong):
 
 
 @pytest.mark.parametrize("rival", [{"masking": "height"}, {"masking": "smith"}])
-@pytest.mark.parametrize(("figure", "material"), [("7", micrograin.METAL), ("8", micrograin.DIFFUSE)])
+@pytest.mark.parametrize(
+    ("figure", "material"), [("7", micrograin.METAL), pytest.param("8", micrograin.DIFFUSE, marks=SLOW)]
+)
 def test_the_published_rivals_fail_in_the_quick_report(monkeypatch, figure, material, rival):
     """Of Fig. 7 and 8 the last grains, whose rivals were hardest to tell; with the model itself all passes."""
     monkeypatch.setattr(micrograin, "GRAINS", micrograin.GRAINS[-1:])

@@ -11,6 +11,7 @@ from asperity.models.vgroove.kaleidoscope import meeting_angle
 from asperity.validation import report, vgroove
 
 pytestmark = pytest.mark.usefixtures("rgb")
+SLOW = pytest.mark.slow
 SHORT, QUICK = report.Effort(4e5, 12), report.Effort(4e5, 16)
 
 
@@ -19,9 +20,9 @@ SHORT, QUICK = report.Effort(4e5, 12), report.Effort(4e5, 16)
     [
         (vgroove.kaleidoscope, (30,)),
         (vgroove.bounces, ()),
-        (vgroove.brdf_by_bounce, (QUICK,)),
-        (vgroove.nonsymmetric, (QUICK,)),
-        (vgroove.furnace, (SHORT,)),
+        pytest.param(vgroove.brdf_by_bounce, (QUICK,), marks=SLOW),
+        pytest.param(vgroove.nonsymmetric, (QUICK,), marks=SLOW),
+        pytest.param(vgroove.furnace, (SHORT,), marks=SLOW),
     ],
 )
 def test_section(section, arguments):
@@ -54,6 +55,7 @@ def test_the_published_rivals_fail_in_the_quick_report(monkeypatch, rival):
     assert not report.passed([section(QUICK)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clamped", [True, False])
 def test_the_unclamped_kaleidoscope_fails(monkeypatch, clamped):
     """Eq. 6 as printed lets f_k be negative: light that reaches both facets is then counted wrongly."""
@@ -73,6 +75,7 @@ def test_the_unclamped_kaleidoscope_fails(monkeypatch, clamped):
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.slow
 @pytest.mark.parametrize("section", [vgroove.brdf_by_bounce, vgroove.nonsymmetric])
 def test_too_few_paths_do_not_pass(monkeypatch, section):
     monkeypatch.setattr(vgroove, "ENOUGH", 1)
