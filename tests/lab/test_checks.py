@@ -64,7 +64,12 @@ def failed(results):
     return {result.name for result in results if result.passed is False}
 
 
-@pytest.mark.parametrize("name", RIGHT)
+SLOW = {"anisotropic", "narrow", "roughdielectric", "delta and smooth", "conductor"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in RIGHT]
+)
 def test_accepts_right_models(name):
     results = checks.check(RIGHT[name], only=list(checks.CHECKS))
     assert not failed(results), results

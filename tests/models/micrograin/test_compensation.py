@@ -17,7 +17,7 @@ def albedo(theta, phi=0.3, **parameters):
 @pytest.mark.parametrize(
     "diffuse_grains", [{}, {"specular": False, "diffuse_reflectance": 1.0}], ids=["mirror", "diffuse"]
 )
-@pytest.mark.parametrize("beta", [(0.1, 0.1), (1.0, 1.0), (5.0, 5.0), (0.1, 3.0)])
+@pytest.mark.parametrize("beta", [(0.1, 0.1), (1.0, 1.0), (5.0, 5.0), pytest.param((0.1, 3.0), marks=SLOW)])
 @pytest.mark.parametrize("masking, tau_0", [("correlated", 0.2), *(pytest.param(*case, marks=SLOW) for case in MORE)])
 def test_multiple_scattering_closes_the_furnace(rgb, diffuse_grains, beta, tau_0, masking):
     """To 0.8 %: the tables' interpolation, most of it across the seven azimuths, and 4096 points a node."""
