@@ -9,6 +9,7 @@ import drjit as dr
 import mitsuba as mi
 
 TINY = 1e-24
+"""Keeps the root's modulus off 0, at the critical angle without absorption; it shows at cosines below 3e-6 alone."""
 
 
 @dataclass

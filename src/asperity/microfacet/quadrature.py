@@ -41,17 +41,17 @@ def accumulate(term: Callable[[Any, Any], tuple], count: Any, start: tuple, capt
 
     # -1: Dr.Jit then differentiates a sum backwards without storing its terms, if it starts from constants. With any
     # other number it aborts the process there, if the loop is in a virtual call.
-    begin = type(count)(0), _apart(captured), tuple(dr.zeros(type(total)) for total in start)
+    begin = type(count)(0), _with_own_derivatives(captured), tuple(dr.zeros(type(total)) for total in start)
     sums = dr.while_loop(begin, lambda index, *_: index < count, add, max_iterations=-1)[2]
     return tuple(total + more for total, more in zip(start, sums))
 
 
-def _apart(tree: Any) -> Any:
-    """The same values, with derivatives of their own: no others, used elsewhere, may meet a loop's (Dr.Jit 1.5)."""
+def _with_own_derivatives(tree: Any) -> Any:
+    """The same values: a loop cannot share the derivatives of its state with what else is made of it (Dr.Jit 1.5)."""
     if isinstance(tree, tuple | list):
-        return type(tree)(map(_apart, tree))
+        return type(tree)(map(_with_own_derivatives, tree))
     if is_dataclass(tree) and not isinstance(tree, type):
-        return replace(tree, **{part.name: _apart(getattr(tree, part.name)) for part in fields(tree)})
+        return replace(tree, **{part.name: _with_own_derivatives(getattr(tree, part.name)) for part in fields(tree)})
     return tree + 0 if dr.is_array_v(tree) and dr.grad_enabled(tree) else tree
 
 

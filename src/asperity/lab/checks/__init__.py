@@ -57,7 +57,7 @@ NAMES = (*CHECKS, "variants")
 
 
 def canonical(given: str) -> str:
-    """Return the name of a check, however it is spelt: ``chi²`` and ``pdf integral`` are old names."""
+    """Return the name of a check, however it is spelt: ``chi²`` or ``pdf integral``, say."""
     name = re.sub(r"[\s_]+", "-", unicodedata.normalize("NFKD", given).strip().lower())
     if name not in NAMES:
         raise UnknownNameError("check", given, NAMES)
