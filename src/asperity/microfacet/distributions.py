@@ -20,9 +20,7 @@ from typing import Any
 
 import drjit as dr
 
-from .numerics import one_minus_exp
-
-TINY = 1e-20
+from .numerics import TINY, one_minus_exp
 
 
 class GGX:

@@ -7,6 +7,10 @@ from __future__ import annotations
 
 import drjit as dr
 
+TINY = 1e-20
+"""Least divisor, far below what is divided by it."""
+ONE_BELOW = 1 - 2**-24
+"""The float32 next to 1: random numbers are in [0, 1)."""
 SMALL = 0.03
 """Below this the Taylor series is used: its error, x⁴/5 relative, equals the rounding of the direct form above it."""
 

@@ -13,9 +13,10 @@ from ..goniophotometer import Estimate, Hemisphere, Measurement, Window, measure
 from ..goniophotometer.masking import measure_masking
 from ..goniophotometer.sensors import directions
 from ..lab import evaluate
+from ..microfacet.ggx import inclination, to_sphere
 from ..models.micrograin import ExplicitGrains, Micrograin
 from ..models.micrograin.grains import density, exposure
-from ..models.micrograin.shadows import Shadows, inclination, shadow, silhouette, to_sphere
+from ..models.micrograin.shadows import Shadows, shadow, silhouette
 from . import figures
 from .report import Effort, Finding, Section, Table, agreement, told_apart
 

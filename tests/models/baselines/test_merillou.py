@@ -7,8 +7,8 @@ import pytest
 from helpers import values
 
 from asperity.lab import evaluate
+from asperity.microfacet.ggx import GRAZING
 from asperity.models.baselines.merillou import SHALLOW, lit_and_visible
-from asperity.models.micrograin.shadows import GRAZING
 
 N = 1 << 14
 WHITE = {"type": "diffuse", "reflectance": 1.0}

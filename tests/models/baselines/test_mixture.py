@@ -8,10 +8,9 @@ import pytest
 from helpers import float64, values
 
 from asperity.lab import evaluate
-from asperity.microfacet.ggx import smith_lambda
+from asperity.microfacet.ggx import normal_in_sphere_space, smith_lambda, to_sphere
 from asperity.models.baselines.mixture import equivalent_roughness
-from asperity.models.micrograin.grains import density, normal_in_sphere_space
-from asperity.models.micrograin.shadows import to_sphere
+from asperity.models.micrograin.grains import density
 
 N = 1 << 14
 WHITE = {"type": "diffuse", "reflectance": 1.0}

@@ -6,14 +6,14 @@ import drjit.llvm.ad as llvm
 import numpy as np
 import pytest
 
+from asperity.microfacet.ggx import normal_in_sphere_space, to_sphere
 from asperity.models.micrograin.grains import (
     density,
     exposure,
-    normal_in_sphere_space,
     sample_visible_normal,
     visible_fraction,
 )
-from asperity.models.micrograin.shadows import shadow, to_sphere
+from asperity.models.micrograin.shadows import shadow
 
 N = 1 << 17
 GRAINS = [(0.37, 1.0, 1.0), (0.62, 0.8, 1.7), (0.2, 2.5, 0.6), (0.85, 0.35, 0.35), (0.05, 0.3, 3.0)]

@@ -9,12 +9,10 @@ import mitsuba as mi
 
 from ...errors import ParameterError
 from ...microfacet.fresnel import conductor
-from ...microfacet.ggx import sample_visible_normal, smith_lambda
+from ...microfacet.ggx import lift, normal_in_sphere_space, sample_visible_normal, smith_lambda, to_sphere
 from ...microfacet.numerics import keep, log1p
 from ...parameters import Declared, conflict
-from ..micrograin.grains import normal_in_sphere_space
 from ..micrograin.model import ALL_COMPONENTS, ONE_BELOW, TINY
-from ..micrograin.shadows import lift, to_sphere
 
 
 def equivalent_roughness(tau_0, beta):

@@ -17,8 +17,9 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 from scipy.stats import qmc
 
+from ...microfacet.ggx import GRAZING, lift, to_sphere
 from .grains import density, sample_visible_normal, visible_fraction
-from .shadows import GRAZING, Shadows, lift, shadow, to_sphere
+from .shadows import Shadows, shadow
 
 FILLINGS, COSINES, AZIMUTHS = 25, 48, 7
 """Nodes of the tables: in arcsin(sqrt(tau_0)), and in sphere space, where losses vary evenly whatever beta: in the root

@@ -17,10 +17,11 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from ...microfacet.ggx import to_sphere
 from ...microfacet.numerics import heading
 from ...microfacet.quadrature import gauss_legendre, integrate
 from .grains import exposure
-from .shadows import Shadows, shadow, to_sphere
+from .shadows import Shadows, shadow
 
 HEIGHTS, AZIMUTHS = 16, (16, 8)
 """Nodes; those in azimuth for the front arc and for the back one, which is mostly empty.

@@ -11,8 +11,9 @@ from typing import Any
 
 import drjit as dr
 
+from ...microfacet.ggx import inclination
 from ...microfacet.numerics import heading, keep, log1p, one_minus_exp
-from .shadows import inclination, silhouette
+from .shadows import silhouette
 
 
 def density(tau_0):
@@ -43,16 +44,6 @@ class Share:
 def exposure(r, h, shaded):
     """Share of the plane at height ``h`` that no grain covers or shades: exp(-r (pi (1 - h^2) + shaded))."""
     return dr.exp(-r * (dr.pi * (1 - h * h) + shaded))
-
-
-def normal_in_sphere_space(m, beta_x, beta_y):
-    """(height h' = m'_z, D_ggx(m)) of a unit normal ``m``; h' is the height on the grain whose normal is m.
-
-    With D_ggx of roughness (beta_x, beta_y), the micrograin NDF of Lucas 2024, Eq. 12 is
-    tau_0 D(m) = pi r exp(-r pi (1 - h'^2)) D_ggx(m); it is used in this product only, which has no 0/0 at tau_0 = 0.
-    """
-    stretch = dr.square(m.x / beta_x) + dr.square(m.y / beta_y) + dr.square(m.z)
-    return m.z * dr.rsqrt(stretch), dr.rcp(dr.pi * beta_x * beta_y * dr.square(stretch))
 
 
 def visible_fraction(r, w):

@@ -14,15 +14,16 @@ from ...errors import ParameterError
 from ...loading import load
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import Dielectric, conductor
+from ...microfacet.ggx import lift, normal_in_sphere_space, to_sphere
 from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import gauss_legendre
 from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict, varies
 from . import smith
 from .compensation import SPARSEST, LossTable, lobe
 from .diffuse import lambertian
-from .grains import Share, density, exposure, normal_in_sphere_space, sample_visible_normal, visible_fraction
+from .grains import Share, density, exposure, sample_visible_normal, visible_fraction
 from .microgeometry import ExplicitGrains
-from .shadows import Shadows, lift, shadow, to_sphere
+from .shadows import Shadows, shadow
 
 CITATION = """\
 @article{Lucas2024Micrograin,

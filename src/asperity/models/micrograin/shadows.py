@@ -13,26 +13,7 @@ from typing import Any
 
 import drjit as dr
 
-GRAZING = 1e-3
-"""Smallest cosine in sphere space: shadows grow as its inverse, beyond what float32 resolves."""
-
-
-def to_sphere(w, beta_x, beta_y):
-    """Direction ``w`` in sphere space: E w / |E w| (Lucas 2024, Sec. 4.2, "Anisotropic GAF")."""
-    stretched = type(w)(beta_x * w.x, beta_y * w.y, w.z)
-    return stretched * dr.rsqrt(dr.squared_norm(stretched))
-
-
-def lift(w, beta_x, beta_y):
-    """``w`` raised where it needs to be, so that its cosine in sphere space is at least `GRAZING`."""
-    tangent = dr.sqrt(dr.square(beta_x * w.x) + dr.square(beta_y * w.y) + 1e-14)
-    raised = type(w)(w.x, w.y, dr.maximum(w.z, GRAZING * tangent))
-    return raised * dr.rsqrt(dr.squared_norm(raised))
-
-
-def inclination(w):
-    """(sine, cosine) of the angle between ``w`` and the normal, safe at normal and at grazing incidence."""
-    return dr.sqrt(w.x * w.x + w.y * w.y + 1e-14), w.z
+from ...microfacet.ggx import inclination
 
 
 def silhouette(sin, cos, h):

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import drjit as dr
 
+from ...microfacet.ggx import inclination
 from ...microfacet.ggx import sample_visible_normal as sample_visible_normal
 from ...microfacet.numerics import one_minus_exp
 from ...microfacet.quadrature import integrate
 from .grains import exposure
-from .shadows import inclination, silhouette
+from .shadows import silhouette
 
 HEIGHTS = 12
 
