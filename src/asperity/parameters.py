@@ -7,8 +7,9 @@ A declaration is a class attribute of the model. From it come parsing, error mes
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
@@ -28,17 +29,34 @@ class Row(NamedTuple):
     kind: str
     default: str
     allowed: str
+    usual: str
     unit: str
     meaning: str
 
 
+class Usual(NamedTuple):
+    """Where the values of a parameter usually are, and whether they vary by factors rather than by sums."""
+
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.low:g} to {self.high:g}{', log' if self.logarithmic else ''}"
+
+
 @dataclass(frozen=True)
 class Parameter:
-    """A declared parameter; ``meaning`` is its one-line documentation, ``name`` that of the class attribute."""
+    """A declared parameter; ``meaning`` is its one-line documentation, ``name`` that of the class attribute.
+
+    ``when`` says when it counts: the name of a choice or flag, and its values then. Where it does not, giving it is an
+    error, and its value is None.
+    """
 
     meaning: str
     default: Any = None
     name: str = field(default="", init=False)
+    when: tuple[Any, ...] = field(default=(), kw_only=True)
     kind: ClassVar[str] = ""
     unit: ClassVar[str] = ""
 
@@ -69,6 +87,19 @@ class Parameter:
         """Value from a scene's properties, or the default; raises ParameterError."""
         raise NotImplementedError
 
+    def at(self, value: Any, si: Any, active: Any) -> Any:
+        """The parsed value at a surface point."""
+        return value
+
+    def counts(self, model: Declared) -> bool:
+        """Whether this means anything to ``model``, with its choices and flags."""
+        return not self.when or getattr(model, self.when[0]) in self.when[1:]
+
+    def unused(self, name: str) -> ParameterError:
+        """An error that says when the parameter would count."""
+        choice, *values = self.when
+        return ParameterError(f"{name}: needs {choice} = {' or '.join(map(json.dumps, values))}.")
+
     def children(self, value: Any) -> Mapping[str, Any]:
         """What ``mi.traverse`` shall find in the parsed value: textures and nested BSDFs by name."""
         return {self.name: value} if isinstance(value, mi.Object) else {}
@@ -77,13 +108,18 @@ class Parameter:
         """(least, greatest) of what `children` returns, by name: where values and derivatives are finite."""
         return {}
 
+    def usual(self) -> Mapping[str, Usual]:
+        """Where values of what `children` returns usually are, by name: for sliders, fits and sweeps."""
+        return {}
+
     def check(self, value: Any) -> None:
         """Raise ParameterError if the parsed value, perhaps updated since, is out of range."""
 
     def rows(self) -> Iterable[Row]:
         """Lines of the parameter table."""
         default = "-" if self.default is None else str(self.default)
-        yield Row(self.name, self.kind, default, self.allowed(), self.unit, self.meaning)
+        usual = str(self.usual().get(self.name, ""))
+        yield Row(self.name, self.kind, default, self.allowed(), usual, self.unit, self.meaning)
 
     def wrong(self, name: str, given: str, where: str = "") -> ParameterError:
         """An error that names the parameter, what was given, and what is allowed."""
@@ -99,6 +135,7 @@ class Texture(Parameter):
     high: float = math.inf
     unit: str = ""  # type: ignore[misc]
     steep: bool = False  # whether derivatives are infinite at the upper end
+    usually: Usual | None = None
     kind: ClassVar[str] = "number or texture"
 
     def allowed(self) -> str:
@@ -107,6 +144,10 @@ class Texture(Parameter):
 
     def parse(self, props: mi.Properties) -> Any:
         """A ``mi.Texture``, or None if none is given and there is no default."""
+        return self.texture_or_default(props)
+
+    def texture_or_default(self, props: mi.Properties) -> Any:
+        """The texture that the scene gives, or that of the default number, if there is one."""
         if self.name in props:
             return self.texture(props, self.name)
         return None if self.default is None else props.get_unbounded_texture(self.name, self.default)
@@ -121,8 +162,8 @@ class Texture(Parameter):
         except RuntimeError as error:
             raise self.wrong(name, props.as_string(name)) from error
         # Mitsuba would take any colour by its luminance.
-        constant = not varies(texture) and texture.class_name() != "UniformSpectrum"
-        if not isinstance(self, Spectrum) and (constant or any(_coloured(found) for _, found in numbers(texture))):
+        spectrum = not varies(texture) and texture.class_name() != "UniformSpectrum"
+        if not isinstance(self, Spectrum) and (spectrum or any(_coloured(found) for _, found in numbers(texture))):
             raise ParameterError(f"{name}: a colour or spectrum, where one number is expected.")
         self.check(texture)
         return texture
@@ -141,6 +182,16 @@ class Texture(Parameter):
             low, value, high = np.array([self.low, value, self.high], dtype=np.float32)
         return bool(np.isfinite(value) and low <= value <= high)
 
+    def usual(self) -> Mapping[str, Usual]:
+        """As declared, or all that is allowed, if that ends."""
+        finite = math.isfinite(self.low) and math.isfinite(self.high)
+        usual = self.usually or (Usual(self.low, self.high) if finite else None)
+        return {} if usual is None else {self.name: usual}
+
+    def at(self, value: Any, si: Any, active: Any) -> Any:
+        """The number, within the range."""
+        return self.clamp(value.eval_1(si, active))
+
     def clamp(self, value: Any) -> Any:
         """Values moved into the range: vertex attributes, which no check sees, and optimisers' steps may leave it."""
         return clamp(value, self.low, self.high)
@@ -154,10 +205,97 @@ class Texture(Parameter):
 
 
 @dataclass(frozen=True)
+class Constant(Texture):
+    """A number in a range, the same everywhere: what tables are made from. It has derivatives like any other."""
+
+    kind: ClassVar[str] = "number"
+
+    def parse(self, props: mi.Properties) -> Any:
+        """A ``mi.Texture`` that does not vary."""
+        texture = super().parse(props)
+        if texture is not None:
+            constant(self.name, texture)
+        return texture
+
+    def at(self, value: Any, si: Any = None, active: Any = True) -> Any:
+        """The number, within the range, wherever the point is."""
+        return self.clamp(constant(self.name, value))
+
+
+@dataclass(frozen=True)
+class Along:
+    """The value of `Axes`: a texture along x and one along y, which are one for an isotropic material."""
+
+    textures: Mapping[str, Any]  # one or two, by name
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether there is one number for both."""
+        return len(self.textures) == 1
+
+    @property
+    def both(self) -> tuple[tuple[str, Any], tuple[str, Any]]:
+        """(name, texture) along x and along y."""
+        first, *rest = self.textures.items()
+        return first, rest[0] if rest else first
+
+
+@dataclass(frozen=True)
+class Axes(Texture):
+    """A number as NAME, or along the axes as NAME_u and NAME_v; an axis that is not given has NAME's default."""
+
+    suffixes: tuple[str, str] = ("_u", "_v")
+
+    def names(self) -> tuple[str, ...]:
+        """NAME, and NAME with either suffix."""
+        return self.name, *(self.name + suffix for suffix in self.suffixes)
+
+    def parse(self, props: mi.Properties) -> Along:
+        """The value by the names that the scene gives, or by NAME."""
+        name, *axes = self.names()
+        conflict({name} & set(props.keys()), set(axes) & set(props.keys()))
+        given = [axis if axis in props else name for axis in axes]
+        return Along({name: self.named(name).texture_or_default(props) for name in dict.fromkeys(given)})
+
+    def at(self, value: Along, si: Any, active: Any) -> tuple[Any, Any]:
+        """The numbers along x and along y."""
+        u, v = (self.clamp(texture.eval_1(si, active)) for _, texture in value.both)
+        return u, v
+
+    def children(self, value: Any) -> Mapping[str, Any]:
+        """One texture or two."""
+        return {} if value is None else value.textures
+
+    def check(self, value: Any) -> None:
+        """Check what is there."""
+        for name, texture in self.children(value).items():
+            Texture.check(self.named(name), texture)
+
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """The same for all names."""
+        return dict.fromkeys(self.names(), (self.low, self.high))
+
+    def usual(self) -> Mapping[str, Usual]:
+        """The same for all names."""
+        return {name: usual for usual in super().usual().values() for name in self.names()}
+
+    def rows(self) -> Iterable[Row]:
+        """A line for each name."""
+        (row,) = super().rows()
+        yield row
+        for axis, name in zip("xy", self.names()[1:]):
+            yield row._replace(name=name, default="-", meaning=f"{self.name} along {axis}, instead of {self.name}")
+
+
+@dataclass(frozen=True)
 class Spectrum(Texture):
     """A number in a range at each wavelength."""
 
     kind: ClassVar[str] = "spectrum or texture"
+
+    def at(self, value: Any, si: Any, active: Any) -> Any:
+        """The spectrum, within the range."""
+        return self.clamp(value.eval(si, active))
 
 
 @dataclass(frozen=True)
@@ -305,17 +443,18 @@ class Declared:
     """What reads the declarations of a class; the base of every model.
 
     A model may define ``configure(given)`` to settle parameters that depend on each other; ``given`` holds the names
-    that the scene gave. ``constant`` names those that cannot be differentiated;
-    ``between``, for a texture, those that its values lie between.
+    that the scene gave. ``between`` names, for a texture, the parameters that its values lie between. ``geometry`` is
+    the class of the microgeometry that it models, if there is one: see `microgeometry`.
     """
 
-    constant: Set[str] = frozenset()
-    between: tuple[str, ...] = ()
+    between: ClassVar[tuple[str, ...]] = ()
+    geometry: ClassVar[Any] = None
 
     @classmethod
     def declarations(cls) -> list[Parameter]:
-        """The parameters in the order in which the class body names them."""
-        return [value for value in vars(cls).values() if isinstance(value, Parameter)]
+        """The parameters, in the order in which class bodies name them; those of base classes come first."""
+        found = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
+        return [value for value in found.values() if isinstance(value, Parameter)]
 
     @classmethod
     def defaults(cls) -> dict[str, Any]:
@@ -345,6 +484,11 @@ class Declared:
             for name in parameter.names():
                 props.mark_queried(name)
         model.configure(given)
+        for parameter in declarations:
+            if not parameter.counts(model):
+                for name in sorted(given.intersection(parameter.names())):
+                    raise parameter.unused(name)
+                setattr(model, parameter.name, None)
         model.update()
         return model
 
@@ -354,13 +498,26 @@ class Declared:
     def update(self) -> None:
         """Bring up to date what is made from the parameters, at first and whenever ``mi.traverse`` changed one."""
 
-    def number(self, name: str, si: Any, active: Any) -> Any:
-        """The number called ``name`` at a surface point."""
-        return getattr(type(self), name).clamp(getattr(self, name).eval_1(si, active))
+    def at(self, name: str, si: Any, active: Any) -> Any:
+        """The parameter ``name`` at a surface point: what its kind's ``at`` returns."""
+        return getattr(type(self), name).at(getattr(self, name), si, active)
+
+    @classmethod
+    def microgeometry(cls, description: dict[str, Any]) -> Any:
+        """The explicit microgeometry that a scene's description of this model stands for; raises ParameterError."""
+        from .loading import load
+
+        load(description)  # complains of what is wrong with it
+        return cls.geometry.of(cls.defaults() | description, set(description))
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """(least, greatest) by the name of a texture."""
         return {name: limits for parameter in self.declarations() for name, limits in parameter.ranges().items()}
+
+    @classmethod
+    def usual(cls) -> dict[str, Usual]:
+        """Usual values by the name of a texture."""
+        return {name: usual for parameter in cls.declarations() for name, usual in parameter.usual().items()}
 
     def children(self) -> dict[str, Any]:
         """Textures and nested BSDFs by name, for ``mi.traverse``."""
@@ -385,6 +542,13 @@ def _coloured(found: np.ndarray) -> bool:
 def varies(texture: Any) -> bool:
     """Whether a texture may differ between points. Not all that do say so (Mitsuba's ``mesh_attribute``)."""
     return texture.is_spatially_varying() or not texture.class_name().endswith("Spectrum")
+
+
+def constant(name: str, texture: Any) -> Any:
+    """The number of a texture, with its derivatives; raises ParameterError, about ``name``, if it varies."""
+    if varies(texture):
+        raise ParameterError(f"{name}: a texture, where one number for the whole surface is expected.")
+    return texture.eval_1(dr.zeros(mi.SurfaceInteraction3f), True)
 
 
 def numbers(texture: Any, differentiated: bool = False) -> Iterable[tuple[str, np.ndarray]]:

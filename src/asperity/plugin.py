@@ -15,6 +15,7 @@ import mitsuba as mi
 from . import llvm, loading, threads
 from .microfacet.albedo import directional_albedo
 from .microfacet.quadrature import RULES, rule
+from .parameters import Usual
 
 ALBEDO_SAMPLES = 256
 
@@ -41,17 +42,52 @@ def _switched(_old: str | None, new: str | None) -> None:
         mi.register_phase(name, _phase(model, new))
 
 
+def _plugin(base: Any, model_class: Any) -> type:
+    """A subclass of Mitsuba's ``base`` with what all plugins share: parameters, traversal, text."""
+
+    class Plugin(base):
+        """Mitsuba's view of a model, whose the physics is."""
+
+        def __init__(self, props: mi.Properties) -> None:
+            self.model = model_class.parse(props)  # first: Mitsuba's constructor makes this known to all threads
+            base.__init__(self, props)
+            self.parts = _parts(self.model)
+
+        def __init_subclass__(cls) -> None:
+            cls.__name__ = cls.__qualname__ = model_class.__name__
+
+        def traverse(self, callback: mi.TraversalCallback) -> None:
+            for name, child in self.model.children().items():
+                callback.put(name, child, mi.ParamFlags.Differentiable)
+
+        def parameters_changed(self, keys: list[str]) -> None:
+            self.model.check()
+            self.model.update()
+
+        def to_string(self) -> str:
+            children = (f"  {name} = {child}".replace("\n", "\n  ") for name, child in self.model.children().items())
+            return f"{model_class.__name__}[\n" + ",\n".join(children) + "\n]"
+
+        def ranges(self) -> dict[str, tuple[float, float]]:
+            """(least, greatest) by the name of a parameter that ``mi.traverse`` shows, for checks and fits."""
+            return self.model.ranges()
+
+        def usual(self) -> dict[str, Usual]:
+            """Usual values by the name of a parameter that ``mi.traverse`` shows, for sliders, fits and sweeps."""
+            return self.model.usual()
+
+    return Plugin
+
+
 @cache
 def _bsdf(model_class: Any, variant: str) -> type:
     """The ``mi.BSDF`` of the active ``variant`` that wraps ``model_class``."""
 
-    class Plugin(mi.BSDF):
-        """Mitsuba's view of a model: flags, components, polarisation, traversal; the physics is the model's."""
+    class BSDF(_plugin(mi.BSDF, model_class)):  # type: ignore[misc]
+        """Adds components, polarisation, and the albedo."""
 
         def __init__(self, props: mi.Properties) -> None:
-            self.model = model_class.parse(props)  # first: Mitsuba's constructor makes this BSDF known to all threads
-            mi.BSDF.__init__(self, props)
-            self.parts = _parts(self.model)
+            super().__init__(props)
             self.m_components = self.model.components()
             self.m_flags = 0
             for flags in self.m_components:
@@ -78,23 +114,15 @@ def _bsdf(model_class: Any, variant: str) -> type:
                 return _depolarise(self.model.directional_albedo(si, active))
             return _depolarise(directional_albedo(self.model.sample, si, active, ALBEDO_SAMPLES))
 
-        traverse, parameters_changed, to_string, ranges = _traverse, _parameters_changed, _to_string, _ranges
-
-    Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
-    return Plugin
+    return BSDF
 
 
 @cache
 def _texture(model_class: Any, variant: str) -> type:
-    """The ``mi.Texture`` of the active ``variant`` that wraps a texture of ours."""
+    """The ``mi.Texture`` of the active ``variant`` that wraps a texture of ours, of one number."""
 
-    class Plugin(mi.Texture):
-        """Mitsuba's view of a texture of one number."""
-
-        def __init__(self, props: mi.Properties) -> None:
-            mi.Texture.__init__(self, props)
-            self.model = model_class.parse(props)
-            self.parts = _parts(self.model)
+    class Texture(_plugin(mi.Texture, model_class)):  # type: ignore[misc]
+        """Adds the number, and its mean."""
 
         def eval_1(self, si, active=True):
             return self.model.eval(si, active)
@@ -111,23 +139,18 @@ def _texture(model_class: Any, variant: str) -> type:
         def is_spatially_varying(self) -> bool:
             return True
 
-        traverse, parameters_changed, to_string, ranges = _traverse, _parameters_changed, _to_string, _ranges
-
-    Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
-    return Plugin
+    return Texture
 
 
 @cache
 def _phase(model_class: Any, variant: str) -> type:
     """The ``mi.PhaseFunction`` of the active ``variant`` that wraps a phase function of ours."""
 
-    class Plugin(mi.PhaseFunction):
-        """Mitsuba's view of a phase function of one component, which depends on the angle."""
+    class Phase(_plugin(mi.PhaseFunction, model_class)):  # type: ignore[misc]
+        """Adds one component, which depends on the angle."""
 
         def __init__(self, props: mi.Properties) -> None:
-            mi.PhaseFunction.__init__(self, props)
-            self.model = model_class.parse(props)
-            self.parts = _parts(self.model)
+            super().__init__(props)
             self.m_flags = int(mi.PhaseFunctionFlags.Anisotropic)
 
         def eval_pdf(self, ctx, mei, wo, active=True):
@@ -138,37 +161,13 @@ def _phase(model_class: Any, variant: str) -> type:
             wo, weight, pdf = self.model.sample(ctx, mei, sample1, sample2, active)
             return wo, _depolarise(weight), pdf
 
-        traverse, parameters_changed, to_string = _traverse, _parameters_changed, _to_string
-
-    Plugin.__name__ = Plugin.__qualname__ = model_class.__name__
-    return Plugin
+    return Phase
 
 
 def _parts(model: Any) -> tuple[Any, ...]:
     """All arrays that a model uses, where ``dr.freeze`` looks for them: it knows containers, but not our classes."""
     rules = [rule(n, mi.Float) for n in RULES] if dr.is_jit_v(mi.Float) else []
     return vars(model), rules
-
-
-def _traverse(self: Any, callback: mi.TraversalCallback) -> None:
-    for name, child in self.model.children().items():
-        constant = name in self.model.constant
-        callback.put(name, child, mi.ParamFlags.NonDifferentiable if constant else mi.ParamFlags.Differentiable)
-
-
-def _parameters_changed(self: Any, keys: list[str]) -> None:
-    self.model.check()
-    self.model.update()
-
-
-def _ranges(self: Any) -> dict[str, tuple[float, float]]:
-    """(least, greatest) by the name of a parameter that ``mi.traverse`` shows, for checks and fits."""
-    return self.model.ranges()
-
-
-def _to_string(self: Any) -> str:
-    children = (f"  {name} = {child}".replace("\n", "\n  ") for name, child in self.model.children().items())
-    return f"{type(self.model).__name__}[\n" + ",\n".join(children) + "\n]"
 
 
 def _depolarise(value: Any) -> Any:

@@ -30,7 +30,7 @@ class Settled(Declared):
     def eval(self, si: mi.SurfaceInteraction3f, active: Any) -> Any:
         """Value at a surface point, from its world-space shading normal."""
         top, bottom, threshold, softness = (
-            self.number(name, si, active) for name in ("top", "bottom", "threshold", "softness")
+            self.at(name, si, active) for name in ("top", "bottom", "threshold", "softness")
         )
         facing = dr.dot(si.sh_frame.n, mi.Vector3f(*self.up))
         t = dr.clip((facing - threshold) / softness / 2 + 0.5, 0, 1)
