@@ -17,7 +17,7 @@ from scipy.special import lpmv
 from scipy.stats import kstest
 
 from asperity.models.lambertsphere import transport
-from asperity.models.lambertsphere.transport import Pair
+from asperity.models.lambertsphere.transport import Directions
 
 N = 1 << 18
 
@@ -266,7 +266,7 @@ def test_float32_follows_float64(brdf):
     values = []
     for number, vector in ((llvm.Float, llvm.Array3f), (llvm.Float64, llvm.Array3f64)):
         s = number(np.float32(0.3))
-        values.append(np.array(brdf(Pair.of(vector(wi), vector(wo)), s)))
+        values.append(np.array(brdf(Directions.of(vector(wi), vector(wo)), s)))
     assert np.isfinite(values[0]).all()
     assert np.allclose(*values, rtol=1e-3, atol=1e-5)
 
