@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 
 from asperity.lab import evaluate
-from asperity.models.lambertsphere.transport import Pair
+from asperity.models.lambertsphere.transport import Directions
 
 N = 1 << 17
 
@@ -68,7 +68,7 @@ def pair(u, v, phi):
     """Pairs of directions of these cosines, apart by these azimuths."""
     u, v, phi = (np.asarray(x, dtype=float).ravel() for x in np.broadcast_arrays(u, v, phi))
     sin = np.sqrt((1 - u * u) * (1 - v * v))
-    return Pair(*map(float64, (u, v, sin * np.cos(phi), sin * sin)))
+    return Directions(*map(float64, (u, v, sin * np.cos(phi), sin * sin)))
 
 
 def gauss(n):

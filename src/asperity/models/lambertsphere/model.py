@@ -14,7 +14,7 @@ from ...microfacet.numerics import clamp, keep
 from ...parameters import Choice, Colour, Declared, conflict
 from . import transport
 from .microgeometry import RandomWalk
-from .transport import Pair
+from .transport import Directions
 
 CITATION = """\
 @article{DEon2021LambertSphere,
@@ -44,7 +44,7 @@ class HalfSpace(Declared):
     draw: Callable  # (uniform number) -> such a cosine
     root: Callable  # (Bond albedo) -> s = sqrt(1 - albedo of the particles)
 
-    def brdf(self, pair: Pair, s):
+    def brdf(self, pair: Directions, s):
         """f_r per steradian, a spectrum."""
         raise NotImplementedError
 
@@ -61,7 +61,7 @@ class HalfSpace(Declared):
         """(f cos_o, solid-angle density of `sample`)."""
         wi, s = si.wi, self._root(si, active)
         active = active & (wi.z > 0) & (wo.z > 0) & ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 0)
-        pair, chance = Pair.of(wi, wo), self._chance(wi, s)
+        pair, chance = Directions.of(wi, wo), self._chance(wi, s)
         product = pair.u * pair.v
         once = self.lobe(-pair.q - product) + self.lobe(product - pair.q)  # up, and folded up
         pdf = chance * once + (1 - chance) * (wo.z / dr.pi)
@@ -117,7 +117,7 @@ class LambertSphere(HalfSpace):
         """With the published fits, the published map."""
         return (transport.published_root if self.variant == "published" else transport.root)(bond)
 
-    def brdf(self, pair: Pair, s):
+    def brdf(self, pair: Directions, s):
         """By the function of the variant's name."""
         return getattr(transport, self.variant)(pair, s)
 

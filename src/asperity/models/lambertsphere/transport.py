@@ -1,17 +1,29 @@
 """Light in a half space of sparse particles: phase function, H functions, azimuthal modes, albedos (d'Eon 2021).
 
-Symbols: mu is a cosine in [0, 1] with the normal, c the particles' albedo in [0, 1] and s = sqrt(1 - c), which is what
-functions take: everything is smooth in s. BRDFs are per steradian. Arguments are Dr.Jit arrays of any precision;
-where nothing else is said, plain floats too.
+Paper                   Here
+c, s = sqrt(1 - c)      ``s``, which is what functions take: everything is smooth in s; c is the particles' albedo
+k_d                     ``bond``: the share that the half space reflects of uniform light
+mu_i, mu_o              ``pair.u``, ``pair.v``: cosines with the normal, u and v below; ``mu`` is either
+S^2, S cos(phi)         ``pair.sin2``, ``pair.q``: phi = 0 is the side of retro-reflection
+p (Eq. 1)               `phase`
+f_1 (Eq. 10)            c `_once` / (u + v)
+H (Eq. 16)              exp of `log_h`, with `H0`, `H1`, `H2` for modes 0, 1, 2
+A, E (Eq. 33)           ``a``, ``e`` in `_modes`
+B, C, D, F, l, m        `CONSTANTS`; ``b, c_, d, f, l, m_1`` in `_modes`, where m_1 = m - 1
+f_m (Eqs. 12, 28, 38)   `_modes`
 
-Where a coefficient has no equation number, it was fitted anew, to the exact solution of the integral equations for the
-psi functions, which agrees with H functions from Eq. 16 and with random walks. The fits' errors are in the docstrings.
+Albedos are in [0, 1], BRDFs per steradian. Arguments are Dr.Jit arrays of any precision; where nothing else is said,
+plain floats too.
+
+Coefficients without an equation number were fitted anew to the exact solution, which `fit` has: there their digits can
+be made again, and their errors measured.
 Corrected errors of the paper: Eqs. 22 and 28 are half of what they should be; Eqs. 23 and 24 multiply where they should
 raise to a power; Eqs. 39 and 40 leave [0, 1].
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -30,7 +42,7 @@ H0: Table = (
     (-0.670716, -0.5507468, 3.959011, -2.268695, 0.01416739),
     (-0.116668, 0.1845958, 0.2516144, -0.6561857, 0.3467337),
 )
-"""H of mode 0, for `log_h`: relative error 6e-4. The same for H1: 2e-4, H2: 5e-4, ISOTROPIC: 5e-4."""
+"""H of mode 0, for `log_h`: relative error 6.2e-4. The same for H1: 1.9e-4, H2: 4.7e-4, ISOTROPIC: 4.7e-4."""
 H1: Table = (
     (-0.3488419, -0.008101413, -0.003119808),
     (0.392435, 0.03027921, -0.08813923),
@@ -51,15 +63,22 @@ CONSTANTS: Table = (
     (-0.063507178, -0.00073576944, 0.0055756383),
     (0.43865626, 0.00068466831, 0.0051653013),
 )
-"""B, C, D, F, l and m - 1 over c, as polynomials in s: absolute errors 12e-6, 23e-6, 6e-6, 14e-6, 5e-5, 5e-5."""
+"""B, C, D, F, l and m - 1 over c, as polynomials in s: absolute errors 9e-6, 22e-6, 3e-6, 11e-6, 5e-5, 5e-5."""
 ESCAPE: Table = (
     (-0.99999552, 0.81466529, -0.55740698, 0.38109997, -0.18620909, 0.047981157),
     (4.5876755e-6, -0.00046424277, -0.085057181, 0.10728903, -0.074855383, 0.023900579),
 )
-"""Q1 and Q2 of `directional_albedo`."""
+"""Q1 and Q2 of `directional_albedo`, as polynomials in s: absolute error of c Q1 and c Q2 6e-6."""
+ROOT: Table = ((1, 1.7659757, 1.7549035, 0.0132454), (1, 2.3798487, 3.5173734, 1.8152825))
+BOND_ALBEDO: Table = ((1, 0.0889736, -0.0481792, -0.0303401), (1, 1.0105177, -0.1646072, -0.2152096))
+ISOTROPIC_ROOT: Table = ((1, 1.9115577, 0.72979103, 0.0055024459), (1, 3.3557257, 3.2437232, 0.8225901))
+ISOTROPIC_BOND_ALBEDO: Table = ((1, 0.87528568, 0.16378542, -0.00030203756), (1, 2.1846868, 1.4920327, 0.30637573))
+"""Numerator and denominator of the functions of these names."""
+INVERSE: Table = ((2.08307335, -0.0772235339, 0.0236680126, -0.0294406505),)
+"""(1 - cos) / y of `invert_phase`, as a polynomial in y = (1 - u)^(2/5): absolute error of cos 8e-5."""
 
 
-class Pair(NamedTuple):
+class Directions(NamedTuple):
     """Two directions away from the surface, as BRDFs need them."""
 
     u: Any  # cosine of the first, at least GRAZING
@@ -68,13 +87,13 @@ class Pair(NamedTuple):
     sin2: Any  # (sin sin)^2
 
     @classmethod
-    def of(cls, wi, wo) -> Pair:
-        """The pair of two vectors; those below the horizon are meaningless, and masked by the caller."""
+    def of(cls, wi: Any, wo: Any) -> Directions:
+        """Those of two vectors; those below the horizon are meaningless, and masked by the caller."""
         sin2 = (dr.square(wi.x) + dr.square(wi.y)) * (dr.square(wo.x) + dr.square(wo.y))
         return cls(dr.maximum(wi.z, GRAZING), dr.maximum(wo.z, GRAZING), wi.x * wo.x + wi.y * wo.y, sin2)
 
 
-def polynomial(x, coefficients):
+def polynomial(x: Any, coefficients: Sequence[Any]) -> Any:
     """Sum of ``coefficients[k] x^k``."""
     total = coefficients[-1]
     for coefficient in coefficients[-2::-1]:
@@ -85,7 +104,7 @@ def polynomial(x, coefficients):
 # The particles.
 
 
-def phase(cos):
+def phase(cos: Any) -> Any:
     """Density per steradian of the cosine between propagation directions; Lambertian spheres (Eq. 1).
 
     p(-1) = 2 / (3 pi) is retro-reflection, p(1) = 0. Mean cosine -4/9.
@@ -94,7 +113,7 @@ def phase(cos):
     return (dr.safe_sqrt(1 - cos * cos) - cos * dr.safe_acos(cos)) * (2 / (3 * dr.pi**2))
 
 
-def phase_cdf(cos):
+def phase_cdf(cos: Any) -> Any:
     """Probability of a smaller cosine: the integral of Eq. 1."""
     cos = dr.clip(cos, -1, 1)
     angle = dr.safe_acos(cos)
@@ -102,35 +121,35 @@ def phase_cdf(cos):
     return 1 + primitive * (4 / (3 * dr.pi))
 
 
-def sample_phase(u, v, w):
+def sample_phase(u: Any, v: Any, w: Any) -> Any:
     """Cosine from three uniform numbers, exactly: a point of the lit disc, then a cosine lobe there (Eq. 5)."""
     return dr.sqrt((1 - u) * (1 - v)) * dr.sin(2 * dr.pi * w) - dr.sqrt(u * v)
 
 
-def sample_phase_approximately(u):
+def sample_phase_approximately(u: Any) -> Any:
     """Cosine from one uniform number, to within 6e-4 (Eq. 6, which says 5e-4). Its density is off by up to 6 %."""
     rest = 1 - dr.power(dr.maximum(u, SMALL), 0.0401885 * u + 1.01938)
     return 1 - 2 * dr.power(dr.maximum(rest, SMALL), 0.397225)
 
 
-def invert_phase(u):
+def invert_phase(u: Any) -> Any:
     """Cosine from one uniform number, to rounding: all that Mitsuba has to spare.
 
     1 - cos is y times a smooth function of y = (1 - u)^(2/5), fitted to within 8e-5; then a step of Newton's.
     """
     y = dr.power(dr.maximum(1 - u, SMALL), 0.4)
-    cos = dr.maximum(1 - y * polynomial(y, (2.08307335, -0.0772235339, 0.0236680126, -0.0294406505)), -1)
+    cos = dr.maximum(1 - y * polynomial(y, INVERSE[0]), -1)
     step = (phase_cdf(cos) - u) / (2 * dr.pi * dr.maximum(phase(cos), 1e-9))
     # Near cos = 1 the density vanishes, and rounding takes over.
     return dr.clip(cos - dr.clip(step, -1e-4, 1e-4), -1, 1)
 
 
-def lobe(cos):
+def lobe(cos: Any) -> Any:
     """Density per steradian, 3 / (16 pi) (1 - cos)^2, like that of `phase` and cheaper: for BSDFs to sample with."""
     return dr.square(1 - cos) * (3 / (16 * dr.pi))
 
 
-def sample_lobe(u):
+def sample_lobe(u: Any) -> Any:
     """Cosine with the density `lobe`, from one uniform number."""
     return 1 - 2 * dr.cbrt(1 - u)
 
@@ -138,50 +157,52 @@ def sample_lobe(u):
 # Albedos.
 
 
-def root(bond):
-    """s = sqrt(1 - c) of the particles that make a half space of this Bond albedo: absolute error 5e-7, of c 9e-7."""
-    top = polynomial(bond, (1, 1.7659757, 1.7549035, 0.0132454))
-    return (1 - bond) * top / polynomial(bond, (1, 2.3798487, 3.5173734, 1.8152825))
+def root(bond: Any) -> Any:
+    """s = sqrt(1 - c) of the particles that make a half space of this Bond albedo: absolute error 5e-7, of c 9.1e-7."""
+    return rational(bond, ROOT)
 
 
-def bond_albedo(s):
-    """Reflected share of uniform light, k_d, in [0, 1]: absolute error 1e-7. The inverse of `root`."""
-    top = polynomial(s, (1, 0.0889736, -0.0481792, -0.0303401))
-    return (1 - s) * top / polynomial(s, (1, 1.0105177, -0.1646072, -0.2152096))
+def bond_albedo(s: Any) -> Any:
+    """Reflected share of uniform light, k_d, in [0, 1]: absolute error 1.1e-7. The inverse of `root`."""
+    return rational(s, BOND_ALBEDO)
 
 
-def isotropic_root(bond):
-    """`root` for isotropic scatterers: absolute error 3e-9, of c 6e-9."""
-    top = polynomial(bond, (1, 1.9115577, 0.72979103, 0.0055024459))
-    return (1 - bond) * top / polynomial(bond, (1, 3.3557257, 3.2437232, 0.8225901))
+def isotropic_root(bond: Any) -> Any:
+    """`root` for isotropic scatterers: absolute error 4.1e-9, of c 7e-9."""
+    return rational(bond, ISOTROPIC_ROOT)
 
 
-def isotropic_bond_albedo(s):
-    """`bond_albedo` for isotropic scatterers: absolute error 1e-9."""
-    top = polynomial(s, (1, 0.87528568, 0.16378542, -0.00030203756))
-    return (1 - s) * top / polynomial(s, (1, 2.1846868, 1.4920327, 0.30637573))
+def isotropic_bond_albedo(s: Any) -> Any:
+    """`bond_albedo` for isotropic scatterers: absolute error 2e-9."""
+    return rational(s, ISOTROPIC_BOND_ALBEDO)
 
 
-def published_root(bond):
+def rational(x: Any, table: Sequence[Sequence[Any]]) -> Any:
+    """(1 - x) times a quotient of polynomials: 1 at 0 and 0 at 1, exactly."""
+    top, bottom = table
+    return (1 - x) * polynomial(x, top) / polynomial(x, bottom)
+
+
+def published_root(bond: Any) -> Any:
     """s from k_d by Eq. 39, kept in [0, 1]: k_d is off by up to .033, 3.9 %."""
     rest = dr.maximum(1 - bond, SMALL)
     top, bottom = 1 - 1.00425 * dr.power(rest, 2.67103), 1 - 0.219924 * dr.power(rest, 2.44559)
     return dr.sqrt(keep(1 - top / bottom, SMALL, 1))
 
 
-def published_bond_albedo(s):
+def published_bond_albedo(s: Any) -> Any:
     """k_d from s (Eq. 40), kept in [0, 1]: absolute error .0023."""
     return dr.clip((1 - 0.544162 * s - 0.453029 * s * s) / (1 + 1.42931 * s), 0, 1)
 
 
-def directional_albedo(mu, s):
+def directional_albedo(mu: Any, s: Any) -> Any:
     """Reflected share of the light along ``mu``, 1 - H0 (1 + c Q1 + c Q2 mu): absolute error 3e-4."""
     c = 1 - s * s
     first, second = (polynomial(s, row) for row in ESCAPE)
     return 1 - dr.exp(log_h(features(mu), s, H0)) * (1 + c * (first + second * mu))
 
 
-def isotropic_directional_albedo(mu, s):
+def isotropic_directional_albedo(mu: Any, s: Any) -> Any:
     """The same for isotropic scatterers, 1 - s H: exact but for H."""
     return 1 - s * dr.exp(log_h(features(mu), s, ISOTROPIC))
 
@@ -189,14 +210,14 @@ def isotropic_directional_albedo(mu, s):
 # H functions.
 
 
-def features(mu):
+def features(mu: Any) -> tuple[Any, ...]:
     """What log H is linear in: L = mu log(1 + 1 / mu), mu, L mu, mu^2."""
     mu = dr.maximum(mu, GRAZING)
     log = mu * dr.log(1 + 1 / mu)
     return log, mu, log * mu, mu * mu
 
 
-def log_h(features, s, table: Table):
+def log_h(features: Iterable[Any], s: Any, table: Table) -> Any:
     """Logarithm of H(mu). Of the sum of the features of two directions, that of H(u) H(v)."""
     return (1 - s * s) * sum(f * polynomial(s, row) for f, row in zip(features, table))
 
@@ -205,10 +226,10 @@ def log_h(features, s, table: Table):
 # (Horak and Chandrasekhar 1961). What of it was scattered once gives way to the exact single scattering (Eq. 11).
 
 
-def accurate(pair: Pair, s):
+def accurate(pair: Directions, s: Any) -> Any:
     """Exact single scattering, and the three modes of the rest by new fits of H and constants.
 
-    Relative error .05 to .15 % rms for c >= .2; 2 % at most, where both directions are at 89.5 degrees.
+    Relative error .04 to .07 % rms for c >= .2; 2 % at most, where both directions are at 89.5 degrees.
     """
     c, both = 1 - s * s, tuple(a + b for a, b in zip(features(pair.u), features(pair.v)))
     h0, h1 = (dr.exp(log_h(both, s, table)) for table in (H0, H1))
@@ -216,7 +237,7 @@ def accurate(pair: Pair, s):
     return _modes(pair, c, h0, h1, x + x * x / 2, [c * polynomial(s, row) for row in CONSTANTS])
 
 
-def published(pair: Pair, s):
+def published(pair: Directions, s: Any) -> Any:
     """The paper's fits, its errors corrected, without mode 2 (Eq. 21).
 
     Relative error .4 % rms at c = .5, 1.8 % at c = 1, 10 % at most; H0 1 %, H1 .3 %. Not 0 but 3e-5 at c = 0.
@@ -237,7 +258,7 @@ def published(pair: Pair, s):
     return clamp(_modes(pair, c, h0, h1, 0, constants), 0, dr.inf)
 
 
-def fast(pair: Pair, s):
+def fast(pair: Directions, s: Any) -> Any:
     """One formula for all that is scattered more than once (Eq. 41). Useful for .3 < c < .96, where it errs by 5 % rms.
 
     It is zero at many directions for c < .25, and reflects more than it gets for k_d > .8. acos(S) / S is left
@@ -250,35 +271,35 @@ def fast(pair: Pair, s):
     return clamp(c * _once(pair) / (pair.u + pair.v) + many, 0, dr.inf)
 
 
-def isotropic(pair: Pair, s):
+def isotropic(pair: Directions, s: Any) -> Any:
     """Isotropic scatterers (Chandrasekhar 1960): c H(u) H(v) / (4 pi (u + v)). Relative error 1e-3."""
     both = (a + b for a, b in zip(features(pair.u), features(pair.v)))
     return (1 - s * s) * dr.exp(log_h(both, s, ISOTROPIC)) / (4 * dr.pi * (pair.u + pair.v))
 
 
-def _once(pair: Pair):
+def _once(pair: Directions) -> Any:
     """Phase function from the one direction to the other (Eq. 10)."""
     return phase(-pair.q - pair.u * pair.v)
 
 
-def _modes(pair: Pair, c, h0, h1, h2, constants):
+def _modes(pair: Directions, c: Any, h0: Any, h1: Any, h2: Any, constants: Sequence[Any]) -> Any:
     """Exact single scattering (Eq. 10), mode 0 (Eqs. 30, 33, 38), mode 1 (Eqs. 22, 28, doubled) and mode 2.
 
     ``h0`` and ``h1`` are H(u) H(v), ``h2`` is H(u) H(v) - 1; mode 2 is that of p3, exactly. ``constants``: see
     CONSTANTS.
     """
-    (b, c_, d, f, l, m), total, product = constants, pair.u + pair.v, pair.u * pair.v
+    (b, c_, d, f, l, m_1), total, product = constants, pair.u + pair.v, pair.u * pair.v
     squares, product2 = total * total - 2 * product, product * product
     a, e = 69 / 128 * c, 15 / 128 * (1 - c) * c * (4 / 3 * c + 3)
     mode0 = h0 * (a + b * total + product * (c_ + d * total) + e * product2 + f * squares) / (2 * dr.pi)
     mode0 = mode0 - c * ((135 * product2 - 45 * squares + 256 * product + 207) / (768 * dr.pi))
-    mode1 = c * h1 * (1 + l * total + (l * l + 45 / 64 * (1 + m)) * product) / (3 * dr.pi)
+    mode1 = c * h1 * (1 + l * total + (l * l + 45 / 64 * (1 + m_1)) * product) / (3 * dr.pi)
     mode1 = (mode1 - c * ((45 * product + 64) / (192 * dr.pi))) * pair.q
     mode2 = c * h2 * ((2 * dr.square(pair.q) - pair.sin2) * (15 / (256 * dr.pi)))
     return (c * _once(pair) + mode0 + mode1 + mode2) / total
 
 
-def _published_h0(mu, c, s):
+def _published_h0(mu: Any, c: Any, s: Any) -> Any:
     """H of mode 0 (Eqs. 31 and 32), its value at infinity without cancellation."""
     a = (1.50112 * dr.power(s, 6.05435) + 8.21644) / (4.17593 - 1.21222 * s)
     d = (7.7731 - 0.565811 * dr.power(s, 0.961546)) / (8.65912 - 0.159974 * s**7)
@@ -286,7 +307,7 @@ def _published_h0(mu, c, s):
     return (1 + x) / (1 + x * s * dr.sqrt((16 - c) * (4 * c + 9)) / 12)
 
 
-def _published_h1(mu, c, s):
+def _published_h1(mu: Any, c: Any, s: Any) -> Any:
     """H of mode 1: Eqs. 23 to 25 with the power that they mean."""
     power = polynomial(mu, (0.459442, -1.07879, 1.85728, -1.12831))
     return dr.exp((0.0242851 * c - 0.144839) * c * dr.power(mu, power))
