@@ -17,10 +17,9 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from ...microfacet.ggx import to_sphere
 from ...microfacet.numerics import heading
 from ...microfacet.quadrature import gauss_legendre, integrate
-from .grains import exposure
+from .grains import Grains, exposure
 from .shadows import Shadows, shadow
 
 HEIGHTS, AZIMUTHS = 16, (16, 8)
@@ -40,11 +39,9 @@ class Integral(NamedTuple):
 
 
 def lambertian(
-    r,
-    beta_x,
-    beta_y,
-    wi,
-    wo,
+    grains: Grains,
+    wi: Any,
+    wo: Any,
     shaded: Callable[[Shadows, Any], Any],
     *,
     closed: bool,
@@ -64,7 +61,8 @@ def lambertian(
 
     What ``share`` and ``coat`` are computed from are the fields of a dataclass: see `accumulate`.
     """
-    i, o = to_sphere(wi, beta_x, beta_y), to_sphere(wo, beta_x, beta_y)
+    r, beta_x, beta_y = grains.r, grains.beta_x, grains.beta_y
+    i, o = grains.to_sphere(wi), grains.to_sphere(wo)
     stretch_o = dr.sqrt(dr.square(beta_x * wo.x) + dr.square(beta_y * wo.y) + dr.square(wo.z))  # |E o|
     captured = r, beta_x, beta_y, wi, wo, Azimuth.between(i, o), Shadows(i, o), share, coat
 

@@ -11,9 +11,36 @@ from typing import Any
 
 import drjit as dr
 
-from ...microfacet.ggx import inclination
-from ...microfacet.numerics import heading, keep, log1p, one_minus_exp
+from ...microfacet.ggx import inclination, lift, to_sphere
+from ...microfacet.numerics import TINY, heading, keep, log1p, one_minus_exp
 from .shadows import silhouette
+
+
+@dataclass
+class Grains:
+    """The grains at a surface point; `of` computes the density. No NamedTuple: it passes through recorded loops."""
+
+    tau_0: Any  # filling factor
+    r: Any  # density in sphere space
+    beta_x: Any
+    beta_y: Any
+
+    @classmethod
+    def of(cls, tau_0: Any, beta_x: Any, beta_y: Any) -> Grains:
+        """Grains that cover the share ``tau_0`` in [0, 1] of the base, of height over radius ``beta_x``, ``beta_y``."""
+        return cls(tau_0, density(tau_0), beta_x, beta_y)
+
+    def to_sphere(self, w: Any) -> Any:
+        """A direction in sphere space."""
+        return to_sphere(w, self.beta_x, self.beta_y)
+
+    def lift(self, w: Any) -> Any:
+        """A direction kept off the horizon; those from below are meaningless then, and masked by the caller."""
+        return lift(w, self.beta_x, self.beta_y)
+
+    def visible(self, w: Any) -> Any:
+        """Visible fraction tau_i along ``w``, kept off zero for those who divide by it."""
+        return dr.maximum(visible_fraction(self.r, self.to_sphere(w)), TINY)
 
 
 def density(tau_0):
@@ -30,7 +57,7 @@ FEWEST = 1e-15
 
 
 @dataclass
-class Share:
+class SecondColour:
     """How much of its second colour a grain has at a point: by height, or by normal if there is an azimuth."""
 
     cos: Any = None  # of the azimuth of the normals with the second colour
