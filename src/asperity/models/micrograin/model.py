@@ -20,7 +20,7 @@ from ...microfacet.quadrature import gauss_legendre
 from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict, varies
 from . import smith
 from .compensation import SPARSEST, LossTable, lobe
-from .diffuse import lambertian
+from .diffuse import Facet, lambertian
 from .grains import Grains, SecondColour, exposure, sample_visible_normal
 from .microgeometry import ExplicitGrains
 from .shadows import Shadows, shadow
@@ -311,15 +311,8 @@ class Micrograin(Declared):
             return albedo * smith.grain_weight(
                 grains.r, grains.to_sphere(wi), grains.to_sphere(wo)
             ) * through * cosine, cosine
-        first, second, pdf = lambertian(
-            grains,
-            wi,
-            wo,
-            self._shaded,
-            closed=self.isotropic and coat is None and self.variation != "normal",
-            share=self._share(si, active),
-            coat=coat,
-        )
+        facet = Facet(self._share(si, active), coat)
+        first, second, pdf = lambertian(grains, wi, wo, self._shaded, facet, isotropic=self.isotropic)
         value = albedo * first
         if self.variation != "none":
             value = value + self.diffuse_reflectance_2.eval(si, active) * second
