@@ -68,6 +68,7 @@ def lambertian(
     closed form, if facets are alike around the grain.
     """
     i, o = grains.to_sphere(wi), grains.to_sphere(wo)
+    stretch_o = dr.sqrt(dr.square(grains.beta_x * wo.x) + dr.square(grains.beta_y * wo.y) + dr.square(wo.z))  # |E o|
     pair = Pair(wi, wo, Shadows(i, o), LitArcs.between(i, o))
     ring = _closed_ring if isotropic and facet.alike_around else _summed_ring
 
@@ -80,7 +81,6 @@ def lambertian(
         return exposed * first, exposed * second, visible * lit
 
     first, second, pdf = integrate(at_height, HEIGHTS, (grains, pair, facet), grains.r * wi.z)
-    stretch_o = dr.sqrt(dr.square(grains.beta_x * wo.x) + dr.square(grains.beta_y * wo.y) + dr.square(wo.z))  # |E o|
     scale = grains.r * stretch_o / (dr.pi * i.z)
     return Integral(scale * first, scale * second, scale * pdf)
 

@@ -84,8 +84,8 @@ class Shadows:
         # right angles to their sum; what is not is rounding, which may be all there is of the longest component.
         d, both = self.i - self.o, self.i + self.o
         d = d - both * (dr.dot(d, both) / dr.squared_norm(both))
-        K = dr.squared_norm(d) / 2  # 1 - i.o
-        self.outlines = Outline.of(self.i, d, K), Outline.of(self.o, -d, K)
+        cross, K = dr.abs(self.i.x * d.y - self.i.y * d.x), dr.squared_norm(d) / 2  # |(i x o).n|, 1 - i.o
+        self.outlines = Outline.of(self.i, d, cross, K), Outline.of(self.o, -d, cross, K)
 
     def union(self, h: Any) -> Any:
         """Area shaded along ``i`` or ``o`` on the plane at height ``h``: sigma_i + sigma_o - sigma_cap (Eq. 18)."""
@@ -111,11 +111,11 @@ class Outline:
     cos_axis: Any
 
     @classmethod
-    def of(cls, w: Any, d: Any, K: Any) -> Outline:
-        """That of the shadow along ``w``; ``d`` is w minus the other direction."""
+    def of(cls, w: Any, d: Any, cross: Any, K: Any) -> Outline:
+        """That of the shadow along ``w``; ``d`` is w minus the other direction, ``cross`` is |(i x o).n|."""
         sin, cos = inclination(w)
         # A and B, times sin. 1e-12: where i = o, both outlines cross at their deepest points.
-        A, B = cos * dr.abs(w.x * d.y - w.y * d.x) + 1e-12, w.x * d.x + w.y * d.y
+        A, B = cos * cross + 1e-12, w.x * d.x + w.y * d.y
         scale = dr.rsqrt(A * A + B * B)
         return cls(sin, cos, K * sin * scale, A * scale, B * scale)
 
