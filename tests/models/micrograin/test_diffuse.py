@@ -7,8 +7,8 @@ import pytest
 from helpers import directions, unit
 
 from asperity.models.micrograin import diffuse
-from asperity.models.micrograin.diffuse import lambertian
-from asperity.models.micrograin.grains import density
+from asperity.models.micrograin.diffuse import Facet, lambertian
+from asperity.models.micrograin.grains import Grains
 from asperity.models.micrograin.shadows import Shadows
 
 
@@ -21,10 +21,12 @@ def test_diffuse_quadrature_is_within_half_a_percent(monkeypatch, closed):
     o[2] = np.maximum(np.abs(o[2]), 0.03)
     o, beta = unit(o), np.exp(rng.uniform(np.log(0.1), np.log(3.2), (2, n)))
     beta_x, beta_y = (llvm.Float64(b) for b in (beta[[0, 0]] if closed else beta))
-    arguments = density(llvm.Float64(rng.uniform(0.03, 0.95, n))), beta_x, beta_y, llvm.Array3f64(i), llvm.Array3f64(o)
+    grains = Grains.of(llvm.Float64(rng.uniform(0.03, 0.95, n)), beta_x, beta_y)
+
+    wi, wo = llvm.Array3f64(i), llvm.Array3f64(o)
 
     def value():
-        return np.asarray(lambertian(*arguments, Shadows.union, closed=closed).first)
+        return np.asarray(lambertian(grains, wi, wo, Shadows.union, Facet(), isotropic=closed).first)
 
     ours = value()
     monkeypatch.setattr(diffuse, "HEIGHTS", 128)

@@ -11,16 +11,15 @@ gives the density of this way to sample: a visible normal first, then the cosine
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import drjit as dr
 
-from ...microfacet.ggx import to_sphere
 from ...microfacet.numerics import heading
 from ...microfacet.quadrature import gauss_legendre, integrate
-from .grains import exposure
+from .grains import Grains, SecondColour, exposure
 from .shadows import Shadows, shadow
 
 HEIGHTS, AZIMUTHS = 16, (16, 8)
@@ -29,6 +28,19 @@ HEIGHTS, AZIMUTHS = 16, (16, 8)
 Against many nodes, over random parameters and directions (cosines >= 0.03, a third near retro-reflection), the relative
 error is 0.02 % in the mean, under 0.5 % in 99.8 % of all and wherever the value exceeds 0.05; the worst are 0.9 %, in
 back-lit directions of value 0.001. Half the nodes have ten times the error."""
+
+
+@dataclass
+class Facet:
+    """What a grain's facets are, beside Lambertian of albedo 1: dataclasses, since they pass through recorded loops."""
+
+    second: SecondColour | None = None  # where there is a second albedo
+    coat: Callable[[Any], Any] | None = None  # reflectance of a dielectric coat, of the local cosine
+
+    @property
+    def alike_around(self) -> bool:
+        """Whether facets at one height are the same."""
+        return self.coat is None and (self.second is None or self.second.by_height)
 
 
 class Integral(NamedTuple):
@@ -40,80 +52,92 @@ class Integral(NamedTuple):
 
 
 def lambertian(
-    r,
-    beta_x,
-    beta_y,
-    wi,
-    wo,
+    grains: Grains,
+    wi: Any,
+    wo: Any,
     shaded: Callable[[Shadows, Any], Any],
+    facet: Facet,
     *,
-    closed: bool,
-    share: Callable | None = None,
-    coat: Callable | None = None,
+    isotropic: bool = False,
 ) -> Integral:
     """Integrate Lambertian grains seen from ``wi`` and lit from ``wo``, both above the surface (Lucas 2024, Eq. 21).
 
     ``pdf`` is not normalised: it integrates to the visible fraction tau_i, less what goes below the horizon.
-
-    Parameters
-    ----------
-    shaded(shadows, h) : area of the shadows at height h, by the choice of masking
-    closed : the azimuth has a closed form; needs beta_x = beta_y, no coat, and a share that varies with height only
-    share(h, m) : of the second albedo at height h and normal m (None if closed), in [0, 1]
-    coat(cos) : reflectance of a grain's dielectric coat, for a local cosine
-
-    What ``share`` and ``coat`` are computed from are the fields of a dataclass: see `accumulate`.
+    ``shaded(shadows, h)`` is the area of the shadows at height h, by the choice of masking: `Shadows.union` or
+    `Shadows.sum`. Grains of beta_x = beta_y may be called ``isotropic``: the integral over the azimuth then has a
+    closed form, if facets are alike around the grain.
     """
-    i, o = to_sphere(wi, beta_x, beta_y), to_sphere(wo, beta_x, beta_y)
-    stretch_o = dr.sqrt(dr.square(beta_x * wo.x) + dr.square(beta_y * wo.y) + dr.square(wo.z))  # |E o|
-    captured = r, beta_x, beta_y, wi, wo, Azimuth.between(i, o), Shadows(i, o), share, coat
+    i, o = grains.to_sphere(wi), grains.to_sphere(wo)
+    stretch_o = dr.sqrt(dr.square(grains.beta_x * wo.x) + dr.square(grains.beta_y * wo.y) + dr.square(wo.z))  # |E o|
+    pair = Pair(wi, wo, Shadows(i, o), LitArcs.between(i, o))
+    ring = _closed_ring if isotropic and facet.alike_around else _summed_ring
 
-    def at_height(t, captured):
-        r, beta_x, _, _, _, azimuth, shadows, share, _ = captured
+    def at_height(t: Any, captured: tuple[Grains, Pair, Facet]) -> tuple[Any, Any, Any]:
+        grains, pair, facet = captured
         h, jacobian = 1 - (1 - t) ** 3, 3 * (1 - t) ** 2  # crowded at the top, which alone is seen at grazing
-        if closed:
-            lit = azimuth.product(h) * dr.rsqrt(dr.square(beta_x) * (1 - h * h) + h * h)
-            second = share(h, None) * lit if share else 0 * lit
-            value = lit
-        else:
-            value, second, lit = at_azimuths(h, captured)
-        exposed = jacobian * exposure(r, h, shaded(shadows, h))
-        visible = jacobian * exposure(r, h, shadow(azimuth.i, h))
-        return exposed * (value - second), exposed * second, visible * lit
+        first, second, lit = ring(h, grains, pair, facet)
+        exposed = jacobian * exposure(grains.r, h, shaded(pair.shadows, h))
+        visible = jacobian * exposure(grains.r, h, shadow(pair.shadows.i, h))
+        return exposed * first, exposed * second, visible * lit
 
-    def at_azimuths(h, captured):
-        _, beta_x, beta_y, wi, wo, azimuth, _, share, coat = captured
-        value, second, lit = 0, 0, 0
-        for m, cosines, width in azimuth.nodes(h):
-            m = type(wi)(beta_x * m.x, beta_y * m.y, m.z)
-            length = dr.rsqrt(dr.squared_norm(m))
-            m, term = m * length, width * cosines * length
-            through = (1 - coat(dr.dot(wi, m))) * (1 - coat(dr.dot(wo, m))) * term if coat else term
-            value, lit = value + through, lit + term
-            second = second + share(h, m) * through if share else 0 * through
-        return value, second, lit
-
-    first, second, pdf = integrate(at_height, HEIGHTS, captured, r * wi.z)
-    scale = r * stretch_o / (dr.pi * i.z)
+    first, second, pdf = integrate(at_height, HEIGHTS, (grains, pair, facet), grains.r * wi.z)
+    scale = grains.r * stretch_o / (dr.pi * i.z)
     return Integral(scale * first, scale * second, scale * pdf)
 
 
 @dataclass
-class Azimuth:
-    """The lit azimuths of a grain at one height: where (i'.m')+ (o'.m')+ is positive, x counted from i towards o."""
+class Pair:
+    """The two directions, and what follows from them at no height yet."""
+
+    wi: Any
+    wo: Any
+    shadows: Shadows
+    arcs: LitArcs
+
+
+def _closed_ring(h: Any, grains: Grains, pair: Pair, facet: Facet) -> tuple[Any, Any, Any]:
+    """Integrals over the azimuth of (i'.m')+ (o'.m')+ T / |E m'|: the first albedo's, the second's, and without T.
+
+    For beta_x = beta_y, where |E m'| depends on the height only, and facets that are alike around the grain.
+    """
+    lit = pair.arcs.product(h) * dr.rsqrt(dr.square(grains.beta_x) * (1 - h * h) + h * h)
+    second = facet.second(h, None) * lit if facet.second else 0 * lit
+    return lit - second, second, lit
+
+
+def _summed_ring(h: Any, grains: Grains, pair: Pair, facet: Facet) -> tuple[Any, Any, Any]:
+    """The same for any grains and facets, by quadrature."""
+    share, coat = facet.second, facet.coat
+    value, second, lit = 0, 0, 0
+    for m, cosines, width in pair.arcs.nodes(h):
+        m = type(m)(grains.beta_x * m.x, grains.beta_y * m.y, m.z)
+        length = dr.rsqrt(dr.squared_norm(m))
+        m, term = m * length, width * cosines * length
+        through = (1 - coat(dr.dot(pair.wi, m))) * (1 - coat(dr.dot(pair.wo, m))) * term if coat else term
+        value, lit = value + through, lit + term
+        second = second + share(h, m) * through if share else 0 * through
+    return value - second, second, lit
+
+
+@dataclass
+class LitArcs:
+    """The lit azimuths of a grain at one height: where (i'.m')+ (o'.m')+ is positive, x counted from i towards o.
+
+    i'.m' = i_z h + radius_i R cos(x) and o'.m' = o_z h + radius_o R cos(x - angle), where R^2 = 1 - h^2.
+    """
 
     i: Any
     o: Any
-    radius_i: Any
+    radius_i: Any  # length of i without its z
     radius_o: Any
-    forward: tuple  # unit vector at x = 0
+    forward: tuple[Any, Any]  # unit vector at x = 0
     turn: Any  # 1 if x is counted counterclockwise, else -1
     angle: Any  # from i to o, in [0, pi]
     sin: Any
     cos: Any
 
     @classmethod
-    def between(cls, i, o) -> Azimuth:
+    def between(cls, i: Any, o: Any) -> LitArcs:
         """What does not depend on the height."""
         # Along the normal, i has no azimuth: any will do, if that of o is counted from it.
         x, y = heading(i.x, i.y)
@@ -123,11 +147,11 @@ class Azimuth:
         sin, cos = dr.sincos(angle)
         return cls(i, o, radius_i, radius_o, (x, y), dr.select(cross < 0, type(cross)(-1), 1), angle, sin, cos)
 
-    def arcs(self, h):
+    def at(self, h: Any) -> Iterator[tuple[Any, Any]]:
         """Start and end of the two lit arcs; the second one is there when light comes from behind, else it is empty."""
         radius = dr.safe_sqrt(1 - h * h)
 
-        def half_width(w, length):  # of the arc with w.m' = w_z h + length radius cos(x) > 0
+        def half_width(w: Any, length: Any) -> Any:  # of the arc with w.m' = w_z h + length radius cos(x) > 0
             a, b = w.z * h, length * radius
             return dr.atan2(dr.safe_sqrt(b * b - a * a), -a)
 
@@ -136,12 +160,12 @@ class Azimuth:
         yield start, dr.maximum(start, end)
         yield -lit_i, dr.maximum(-lit_i, dr.minimum(lit_i, self.angle + lit_o - 2 * dr.pi))
 
-    def product(self, h):
+    def product(self, h: Any) -> Any:
         """Integral of (i'.m')+ (o'.m')+ over the azimuth, in closed form."""
         radius = dr.safe_sqrt(1 - h * h)
         a_i, b_i, a_o, b_o = self.i.z * h, self.radius_i * radius, self.o.z * h, self.radius_o * radius
 
-        def primitive(x):
+        def primitive(x: Any) -> Any:  # of (a_i + b_i cos(x)) (a_o + b_o cos(x - angle))
             sin, cos = dr.sincos(x)
             sin_o = sin * self.cos - cos * self.sin  # sin(x - angle)
             cos_o = cos * self.cos + sin * self.sin
@@ -152,13 +176,13 @@ class Azimuth:
                 + b_i * b_o / 2 * (x * self.cos + (sin * cos_o + cos * sin_o) / 2)
             )
 
-        return dr.maximum(sum(primitive(end) - primitive(start) for start, end in self.arcs(h)), 0)
+        return dr.maximum(sum(primitive(end) - primitive(start) for start, end in self.at(h)), 0)
 
-    def nodes(self, h):
+    def nodes(self, h: Any) -> Iterator[tuple[Any, Any, Any]]:
         """(m', (i'.m') (o'.m'), weight) at the nodes of a Gauss-Legendre rule on either lit arc."""
         radius = dr.safe_sqrt(1 - h * h)
         forward_x, forward_y = self.forward
-        for (start, end), count in zip(self.arcs(h), AZIMUTHS):
+        for (start, end), count in zip(self.at(h), AZIMUTHS):
             for t, weight in zip(*gauss_legendre(count)):
                 sin, cos = dr.sincos(start + t * (end - start))
                 sin = sin * self.turn

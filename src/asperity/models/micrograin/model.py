@@ -14,14 +14,14 @@ from ...errors import ParameterError
 from ...loading import load
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import Dielectric, conductor
-from ...microfacet.ggx import lift, normal_in_sphere_space, to_sphere
+from ...microfacet.ggx import normal_in_sphere_space
 from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import gauss_legendre
 from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict, varies
 from . import smith
 from .compensation import SPARSEST, LossTable, lobe
-from .diffuse import lambertian
-from .grains import Share, density, exposure, sample_visible_normal, visible_fraction
+from .diffuse import Facet, lambertian
+from .grains import Grains, SecondColour, exposure, sample_visible_normal
 from .microgeometry import ExplicitGrains
 from .shadows import Shadows, shadow
 
@@ -42,27 +42,6 @@ ALL_COMPONENTS = 0xFFFFFFFF
 METAL = {"material", "eta", "k", "reflectivity", "edge_tint"}
 COAT = {"int_ior", "ext_ior"}
 ALBEDO = {"diffuse_reflectance", "diffuse_reflectance_2"}
-
-
-class Grains(NamedTuple):
-    """The grains at a surface point."""
-
-    tau_0: Any
-    r: Any  # density in sphere space
-    beta_x: Any
-    beta_y: Any
-
-    def to_sphere(self, w):
-        """A direction in sphere space."""
-        return to_sphere(w, self.beta_x, self.beta_y)
-
-    def lift(self, w):
-        """A direction kept off the horizon; those from below are meaningless then, and masked by the caller."""
-        return lift(w, self.beta_x, self.beta_y)
-
-    def visible(self, w):
-        """Visible fraction tau_i along ``w``, kept off zero for those who divide by it."""
-        return dr.maximum(visible_fraction(self.r, self.to_sphere(w)), TINY)
 
 
 class Lobe(NamedTuple):
@@ -246,7 +225,7 @@ class Micrograin(Declared):
         """The grains here, the chance of each enabled lobe of theirs, and that of the base (None if not wanted)."""
         tau_0 = self.number("tau_0", si, active)
         beta_x, beta_y = (self.number(name, si, active) for name in self.axes)
-        grains = Grains(tau_0, density(tau_0), beta_x, beta_y)
+        grains = Grains.of(tau_0, beta_x, beta_y)
         wi, above = grains.lift(si.wi), si.wi.z > 0
         shares = {
             n: dr.select(above, lobe.weigh(self, si, active, grains, wi), 0)
@@ -332,15 +311,8 @@ class Micrograin(Declared):
             return albedo * smith.grain_weight(
                 grains.r, grains.to_sphere(wi), grains.to_sphere(wo)
             ) * through * cosine, cosine
-        first, second, pdf = lambertian(
-            *grains[1:],
-            wi,
-            wo,
-            self._shaded,
-            closed=self.isotropic and coat is None and self.variation != "normal",
-            share=self._share(si, active),
-            coat=coat,
-        )
+        facet = Facet(self._share(si, active), coat)
+        first, second, pdf = lambertian(grains, wi, wo, self._shaded, facet, isotropic=self.isotropic)
         value = albedo * first
         if self.variation != "none":
             value = value + self.diffuse_reflectance_2.eval(si, active) * second
@@ -387,8 +359,8 @@ class Micrograin(Declared):
         """The second colour's share at a point of the grain, or None."""
         if self.variation == "normal":
             sin, cos = dr.sincos(dr.deg2rad(self.number("variation_azimuth", si, active)))
-            return Share(cos, sin)
-        return Share() if self.variation == "height" else None
+            return SecondColour(cos, sin)
+        return SecondColour() if self.variation == "height" else None
 
     def _coat(self, si, active):
         """The grains' dielectric coat: from the local cosine to its reflectance."""

@@ -2,8 +2,27 @@
 
 All areas live in the *sphere space* where every grain is a unit hemisphere: directions are stretched by
 E = diag(beta_x, beta_y, 1), see `to_sphere`. A shadow is cast on the plane at height ``h`` in [0, 1] above the base.
-Formulas are the appendices A and B of the paper with its errata mended and without case distinctions.
-Arguments are Dr.Jit arrays of any precision, or plain floats; directions have ``x``, ``y``, ``z``.
+Formulas are the appendices A and B of the paper with its errata mended and without case distinctions: see "Derivations"
+in docs/micrograin.md. Arguments are Dr.Jit arrays of any precision, or plain floats; directions have ``x``, ``y``,
+``z``.
+
+========================  ==================  ==========================================================================
+paper                     here                meaning
+========================  ==================  ==========================================================================
+i', o'                    ``i``, ``o``        unit directions in sphere space; ``w`` is either of them
+sin theta_i, cos theta_i  ``sin``, ``cos``    of the angle between ``w`` and the normal
+h', cos theta_m           ``h``               height of the plane H; sin^2 theta_m = 1 - h^2
+C_h                       disc                what the grain cuts from H; its radius is sin theta_m
+E_h(i)                    outline             where the cylinder along ``w`` about the grain meets H: an ellipse
+-                         ``psi``             angle around that cylinder, 0 at the shadow's deepest point
+-                         ``eta``             the same point's azimuth about the disc's centre, 0 opposite to ``w``
+q_i+, q_i-                silhouette points   where disc and outline touch: psi = +-``alpha``, eta = +-``gamma``
+pi - phi_q                ``gamma``           azimuth of the silhouette point
+e_x                       h sin / cos         from the disc's centre to the ellipse's
+p_+                       crossing            where the outlines of both shadows meet, psi > 0 being towards the other
+sigma_s                   `shadow`            area of a shadow
+sigma_s + sigma_s - cap   `Shadows.union`     area of both, their overlap sigma_cap counted once
+========================  ==================  ==========================================================================
 """
 
 from __future__ import annotations
@@ -16,86 +35,118 @@ import drjit as dr
 from ...microfacet.ggx import inclination
 
 
-def silhouette(sin, cos, h):
+def silhouette(sin: Any, cos: Any, h: Any) -> tuple[Any, Any, Any]:
     """(cos alpha, sin alpha, gamma) of the silhouette point of a shadow on the plane at height ``h``.
 
-    alpha is half the angle around the shadow's cylinder that is in light, cos alpha = h / sin; 0 if there is no shadow.
-    gamma is the azimuth of that point about the centre of the disc that the grain cuts from the plane.
+    cos alpha = h / sin; alpha and gamma are 0 if there is no shadow.
     """
     cos_alpha = dr.minimum(h / sin, 1)
-    sin_alpha = dr.safe_sqrt((1 - cos_alpha) * (1 + cos_alpha))
+    sin_alpha = _other(cos_alpha)
     return cos_alpha, sin_alpha, dr.atan2(sin_alpha, cos * cos_alpha + 1e-20)
 
 
-def shadow(w, h):
+def shadow(w: Any, h: Any) -> Any:
     """Area sigma_s of the shadow along ``w`` on the plane at height ``h`` (Lucas 2024, Appendix A)."""
     sin, cos = inclination(w)
     cos_alpha, sin_alpha, gamma = silhouette(sin, cos, h)
     alpha = dr.atan2(sin_alpha, cos_alpha + 1e-20)
-    return dr.maximum((alpha - h * sin * sin_alpha) / cos - (1 - h * h) * gamma, 0)
+    return dr.maximum(_beyond_disc(h, sin, cos, alpha, sin_alpha, gamma), 0)
+
+
+def _beyond_disc(h: Any, sin: Any, cos: Any, psi: Any, sin_psi: Any, eta: Any) -> Any:
+    """Twice the area between disc and outline from the shadow's deepest point to ``psi``: sigma_e - sigma_t - sigma_c.
+
+    The whole shadow is twice what is between 0 and alpha. The last three arguments may be sums over several ``psi``.
+    """
+    # Those of the ellipse are taken in the cylinder's cross-section, which the plane stretches by 1 / cos.
+    ellipse_sector, triangle = psi, h * sin * sin_psi
+    disc_sector = (1 - h * h) * eta
+    return (ellipse_sector - triangle) / cos - disc_sector
 
 
 @dataclass
 class Shadows:
     """The two shadows along ``i`` and ``o``, which may overlap (Lucas 2024, Appendix B).
 
-    Where their outlines cross, p.(i - o) = 0. In the angle psi around one shadow's cylinder, counted from its deepest
-    point towards the other shadow, that is linear: B cos(psi) - A sin(psi) = (1 - i.o) h. Clipping psi at the
-    silhouette points, +-alpha, yields the paper's three cases without telling them apart.
+    The ray from the disc's centre through the crossing of the outlines parts their union in two: on either side it is
+    the shadow that reaches further there. Clipping the crossing to the silhouette points yields the paper's three cases
+    without telling them apart.
     """
 
     i: Any
     o: Any
-    sides: Any = None  # what `_half` needs of either, from i and o
+    outlines: Any = None  # both `Outline`s, made from i and o
 
-    def __post_init__(self):
-        if self.sides is not None:  # a copy of Dr.Jit's, in a loop
+    def __post_init__(self) -> None:
+        if self.outlines is not None:  # a copy of Dr.Jit's, in a loop
             return
-        i, o = self.i, self.o
         # The difference first: i.o and cross products lose all digits near retro-reflection. That of unit vectors is at
         # right angles to their sum; what is not is rounding, which may be all there is of the longest component.
-        between, both = i - o, i + o
-        between = between - both * (dr.dot(between, both) / dr.squared_norm(both))
-        x, y, one_minus_cos = between.x, between.y, dr.squared_norm(between) / 2
-        cross = dr.abs(i.x * y - i.y * x)
-        alongs = i.x * x + i.y * y, -(o.x * x + o.y * y)
-        self.sides = [self._side(w, cross, along, one_minus_cos) for w, along in zip((i, o), alongs)]
+        d, both = self.i - self.o, self.i + self.o
+        d = d - both * (dr.dot(d, both) / dr.squared_norm(both))
+        cross, K = dr.abs(self.i.x * d.y - self.i.y * d.x), dr.squared_norm(d) / 2  # |(i x o).n|, 1 - i.o
+        self.outlines = Outline.of(self.i, d, cross, K), Outline.of(self.o, -d, cross, K)
 
-    @staticmethod
-    def _side(w, cross, along, one_minus_cos):
-        """What does not depend on the height: inclination, (1 - i.o) / |(A, B)|, and the angle of (A, B)."""
-        sin, cos = inclination(w)
-        a, b = cos * cross + 1e-12, along  # times sin
-        scale = dr.rsqrt(a * a + b * b)
-        return sin, cos, one_minus_cos * sin * scale, a * scale, b * scale
-
-    def union(self, h):
+    def union(self, h: Any) -> Any:
         """Area shaded along ``i`` or ``o`` on the plane at height ``h``: sigma_i + sigma_o - sigma_cap (Eq. 18)."""
-        return dr.maximum(sum(self._half(h, *side) for side in self.sides), 0)
+        return dr.maximum(sum(outline.own_part(h) for outline in self.outlines), 0)
 
-    def sum(self, h):
+    def sum(self, h: Any) -> Any:
         """Area of both shadows, their overlap counted twice: sigma_i + sigma_o (Eq. 17)."""
         return shadow(self.i, h) + shadow(self.o, h)
 
-    @staticmethod
-    def _half(h, sin, cos, level, sin_axis, cos_axis):
-        """A shadow less its half of the overlap, which ends at psi = crossing - axis.
 
-        sigma - [alpha - psi - h sin (sin alpha - sin psi)] / (2 cos) + (1 - h^2) (gamma - eta) / 2: the angles come in
-        the sums alpha + psi and gamma + eta, each a single arc tangent. eta is psi as seen from the disc's centre.
+@dataclass
+class Outline:
+    """The outline of one of two shadows, and where it crosses the other's: what does not depend on the height.
+
+    A point p of the plane is on both outlines where p.(i - o) = 0. In psi that is linear, B cos(psi) - A sin(psi) = K h
+    with K = 1 - i.o, or cos(psi + axis) = level h, where axis is the angle of (B, A).
+    """
+
+    sin: Any  # of the direction's angle with the normal
+    cos: Any
+    level: Any  # K / |(A, B)|
+    sin_axis: Any
+    cos_axis: Any
+
+    @classmethod
+    def of(cls, w: Any, d: Any, cross: Any, K: Any) -> Outline:
+        """That of the shadow along ``w``; ``d`` is w minus the other direction, ``cross`` is |(i x o).n|."""
+        sin, cos = inclination(w)
+        # A and B, times sin. 1e-12: where i = o, both outlines cross at their deepest points.
+        A, B = cos * cross + 1e-12, w.x * d.x + w.y * d.y
+        scale = dr.rsqrt(A * A + B * B)
+        return cls(sin, cos, K * sin * scale, A * scale, B * scale)
+
+    def own_part(self, h: Any) -> Any:
+        """Area of the shadow from its silhouette point on the far side, psi = -alpha, to the crossing.
+
+        The angles come in sums, alpha + psi and gamma + eta, each of which is a single arc tangent.
         """
-        cos_alpha, cos_crossing = dr.minimum(h / sin, 1), dr.minimum(level * h, 1)
-        sin_alpha, sin_crossing = (dr.safe_sqrt((1 - x) * (1 + x)) for x in (cos_alpha, cos_crossing))
-        sin_psi = sin_crossing * cos_axis - cos_crossing * sin_axis
-        cos_psi = cos_crossing * cos_axis + sin_crossing * sin_axis
+        sin, cos = self.sin, self.cos
+        cos_alpha = dr.minimum(h / sin, 1)
+        sin_alpha = _other(cos_alpha)
+        cos_psi, sin_psi = self._crossing(h, cos_alpha, sin_alpha)
+        psi = _sum_of_angles(cos_alpha, sin_alpha, cos_psi, sin_psi)
+        eta = _sum_of_angles(cos * cos_alpha, sin_alpha, cos_psi - h * sin, cos * sin_psi)
+        return _beyond_disc(h, sin, cos, psi, sin_alpha + sin_psi, eta) / 2
+
+    def _crossing(self, h: Any, cos_alpha: Any, sin_alpha: Any) -> tuple[Any, Any]:
+        """(cos psi, sin psi) of the crossing p_+, clipped to [-alpha, alpha]."""
+        cos_sum = dr.minimum(self.level * h, 1)  # psi + axis
+        sin_sum = _other(cos_sum)
+        sin_psi = sin_sum * self.cos_axis - cos_sum * self.sin_axis
+        cos_psi = cos_sum * self.cos_axis + sin_sum * self.sin_axis
         beyond = (cos_psi < 0) | (dr.abs(sin_psi) > sin_alpha)  # sines tell small angles apart, cosines do not
-        sin_psi = dr.select(beyond, dr.copysign(sin_alpha, sin_psi), sin_psi)
-        cos_psi = dr.select(beyond, cos_alpha, cos_psi)
-        angle = _angle_of_product(cos_alpha, sin_alpha, cos_psi, sin_psi)
-        centre = _angle_of_product(cos * cos_alpha, sin_alpha, cos_psi - h * sin, cos * sin_psi)
-        return ((angle - h * sin * (sin_alpha + sin_psi)) / cos - (1 - h * h) * centre) / 2
+        return dr.select(beyond, cos_alpha, cos_psi), dr.select(beyond, dr.copysign(sin_alpha, sin_psi), sin_psi)
 
 
-def _angle_of_product(x, y, u, v):
+def _other(x: Any) -> Any:
+    """The sine that belongs to a cosine, without cancellation near 1."""
+    return dr.safe_sqrt((1 - x) * (1 + x))
+
+
+def _sum_of_angles(x: Any, y: Any, u: Any, v: Any) -> Any:
     """Sum of the polar angles of (x, y) and (u, v), if that is in [0, pi]."""
     return dr.atan2(dr.maximum(x * v + y * u, 0), x * u - y * v + 1e-20)
