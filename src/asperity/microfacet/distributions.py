@@ -59,11 +59,20 @@ class Distribution:
         square = dr.rcp(dr.square(cos_azimuth / self.alpha_u) + dr.square(sin_azimuth / self.alpha_v))
         return dr.sqrt(square), square / (self.alpha_u * self.alpha_v)
 
+    def stretched_azimuth(self, cos_psi: Any, sin_psi: Any) -> tuple[Any, Any, Any]:
+        """(cos phi, sin phi, alpha_phi), for an azimuth psi with tan phi = alpha_v / alpha_u tan psi.
+
+        That of normals has the density scale / (2 pi) over phi; over psi it is even.
+        """
+        x, y = self.alpha_u * cos_psi, self.alpha_v * sin_psi
+        square = dr.square(x) + dr.square(y)
+        inverse = dr.rsqrt(square)
+        return x * inverse, y * inverse, square * inverse
+
     def sample_azimuth(self, v: Any) -> tuple[Any, Any]:
-        """(cos phi, sin phi) of normals with density D cos, whose azimuths have the density scale / (2 pi)."""
+        """(cos phi, sin phi) of normals with density D cos."""
         sin, cos = dr.sincos(2 * dr.pi * v)
-        sin, cos = normalised(self.alpha_v * sin, self.alpha_u * cos)
-        return cos, sin
+        return self.stretched_azimuth(cos, sin)[:2]
 
     def density(self, m: Any) -> Any:
         """D(m) of a unit normal above the horizon."""
@@ -72,9 +81,10 @@ class Distribution:
 
     def sample(self, u: Any, v: Any) -> Any:
         """A normal with density D(m) m_z per steradian, for ``u``, ``v`` in [0, 1)."""
-        x, y = self.sample_azimuth(v)
-        sin, cos = self.sample_tilt(self.along(x, y)[0], u)
-        return direction(sin * x, sin * y, cos)
+        sin_psi, cos_psi = dr.sincos(2 * dr.pi * v)
+        cos_phi, sin_phi, alpha = self.stretched_azimuth(cos_psi, sin_psi)
+        sin, cos = self.sample_tilt(alpha, u)
+        return direction(sin * cos_phi, sin * sin_phi, cos)
 
 
 class GGX(Distribution):
