@@ -33,7 +33,7 @@ def published(distribution: str, alpha: float, theta: float) -> list[np.ndarray]
     G_k / sum G, and the sum into the weight.
     """
     u, azimuth = evaluate.variates(N, 1)
-    sin, cos = DISTRIBUTIONS[distribution].sample(mi.Float(alpha), u)
+    sin, cos = DISTRIBUTIONS[distribution].sample_tilt(mi.Float(alpha), u)
     tilt, i = dr.maximum(dr.atan2(sin, cos), 1e-4), evaluate.direction(theta, 0)
     across = i.x * dr.cos(2 * dr.pi * azimuth.x)
     psi, length = dr.atan2(across, i.z), dr.sqrt(across * across + i.z * i.z)

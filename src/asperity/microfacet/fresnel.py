@@ -18,12 +18,12 @@ class Dielectric:
 
     eta: Any
 
-    def __call__(self, cos):
+    def __call__(self, cos: Any) -> Any:
         """Unpolarised reflectance at the cosine of incidence from outside."""
         return mi.fresnel(cos, self.eta)[0]
 
 
-def conductor(cos, eta, k):
+def conductor(cos: Any, eta: Any, k: Any) -> Any:
     """Unpolarised reflectance of a conductor of index ``eta`` + i ``k`` for the cosine of incidence: in [0, 1].
 
     Unlike Mitsuba's, never negative by rounding, and with a derivative by k at 0, where light is totally reflected:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import numpy as np
+
+from .numerics import heading
+
+if TYPE_CHECKING:
+    from .distributions import Distribution
 
 RULES = (4, 5, 6, 8, 12, 16)
 """Numbers of nodes that models use in recorded loops."""
@@ -36,7 +42,7 @@ def accumulate(term: Callable[[Any, Any], tuple], count: Any, start: tuple, capt
     are in every render (Dr.Jit 1.5).
     """
 
-    def add(index, captured, sums):
+    def add(index: Any, captured: Any, sums: tuple) -> tuple:
         return index + 1, captured, tuple(total + one for total, one in zip(sums, term(index, captured)))
 
     # -1: Dr.Jit then differentiates a sum backwards without storing its terms, if it starts from constants. With any
@@ -62,16 +68,63 @@ def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, 
     fast as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives
     need the copies.
     """
-    Float: Any = type(like)
-    first = gauss_legendre(n)[0][0]
-    if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(Float(first), captured))):
-        terms = [[weight * value for value in f(node, captured)] for node, weight in zip(*gauss_legendre(n))]
+    return _integrate(lambda node, _, captured: f(node, captured), n, captured, like, nested)
+
+
+def over_normals(
+    f: Callable[[Any, Any], tuple],
+    distribution: Distribution,
+    towards: Any,
+    captured: Any,
+    rings: int = 8,
+    azimuths: int = 32,
+    nested: bool = False,
+) -> tuple:
+    """Integrals of ``f(m, captured) D(m) m_z`` over all normals m above the horizon, for ``f`` that returns a tuple.
+
+    The normals of a ring have the same share of the facets, D m_z, within; they are evenly spaced where the stretched
+    distribution is isotropic, and so a kink of ``f`` along <w.m> = 0 is where all of them look alike. Every other ring
+    is turned by half a step. They come in pairs m, (-m_x, -m_y, m_z), the facets of a V-cavity. The first normal is
+    half a step from the azimuth of ``towards``: take the more grazing of two directions, and what is reciprocal, or
+    independent of the azimuth, stays so. ``azimuths`` are even; ``captured`` and ``nested`` are those of `integrate`.
+    """
+    vector: Any = type(towards)
+    start = heading(distribution.alpha_u * towards.x, distribution.alpha_v * towards.y)
+
+    def ring(u: Any, index: Any, everything: Any) -> tuple:
+        distribution, (x, y), captured = everything
+        odd, terms = index % 2 == 1, []
+        for step in range(azimuths // 2):
+            turns = (_turned(x, y, 2 * math.pi * (step + half) / azimuths) for half in (1, 0.5))
+            psi = (dr.select(odd, *either) for either in zip(*turns))
+            cos_phi, sin_phi, alpha = distribution.stretched_azimuth(*psi)
+            (sin, cos), weight = distribution.tilt_node(alpha, u)
+            m = vector(sin * cos_phi, sin * sin_phi, cos)
+            for normal in (m, vector(-m.x, -m.y, m.z)):
+                terms.append([weight / azimuths * value for value in f(normal, captured)])
         return tuple(map(sum, zip(*terms)))
-    start = tuple(dr.zeros(type(value)) for value in f(Float(first), captured))
+
+    return _integrate(ring, rings, (distribution, start, captured), towards.z, nested)
+
+
+def _turned(x: Any, y: Any, angle: float) -> tuple[Any, Any]:
+    sin, cos = math.sin(angle), math.cos(angle)
+    return x * cos - y * sin, x * sin + y * cos
+
+
+def _integrate(f: Callable[[Any, Any, Any], tuple], n: int, captured: Any, like: Any, nested: bool) -> tuple:
+    """`integrate` for ``f(node, index, captured)``."""
+    Float: Any = type(like)
+    nodes, weights = gauss_legendre(n)
+    if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(Float(nodes[0]), 0, captured))):
+        copies = (f(node, index, captured) for index, node in enumerate(nodes))
+        terms = [[weight * value for value in values] for values, weight in zip(copies, weights)]
+        return tuple(map(sum, zip(*terms)))
+    start = tuple(dr.zeros(type(value)) for value in f(Float(nodes[0]), 0, captured))
     nodes, weights = rule(n, Float)
 
-    def term(index, captured):
+    def term(index: Any, captured: Any) -> tuple:
         weight = dr.gather(Float, weights, index)
-        return tuple(weight * value for value in f(dr.gather(Float, nodes, index), captured))
+        return tuple(weight * value for value in f(dr.gather(Float, nodes, index), index, captured))
 
     return accumulate(term, dr.uint32_array_t(Float)(n), start, captured)

@@ -13,12 +13,12 @@ import pytest
 from helpers import N, cosine_directions, towards
 
 from asperity.lab import evaluate as lab
-from asperity.lab.evaluate import variates
-from asperity.microfacet.distributions import DISTRIBUTIONS, GGX, Profile
+from asperity.microfacet.distributions import DISTRIBUTIONS, GGX
 from asperity.models.vgroove.bounces import needed_bounces_nonsymmetric
 from asperity.models.vgroove.kaleidoscope import Pair
-from asperity.models.vgroove.model import VGroove, _more_numbers
+from asperity.models.vgroove.model import VGroove
 from asperity.models.vgroove.symmetric import symmetric
+from asperity.models.vgroove.tilts import Tilts
 
 
 def interaction_towards(theta):
@@ -41,11 +41,7 @@ def test_single_bounce_is_cook_torrance(rgb, name):
     rng = np.random.default_rng(0)
     i, o = cosine_directions(rng, 10_000), cosine_directions(rng, 10_000)
     h = (i + o) / np.linalg.norm(i + o, axis=0)
-    d = Profile.along(
-        DISTRIBUTIONS[name],
-        llvm.Float64(h[0] / np.hypot(*h[:2])), llvm.Float64(h[1] / np.hypot(*h[:2])),
-        llvm.Float64(0.4), llvm.Float64(0.6),
-    ).density(llvm.Float64(np.hypot(*h[:2])), llvm.Float64(h[2]))  # fmt: skip
+    d = DISTRIBUTIONS[name](0.4, 0.6).density(llvm.Array3f64(h))
     g = np.minimum(1, 2 * h[2] * np.minimum(i[2], o[2]) / (i * h).sum(0))
     value, _ = evaluate(i, o, distribution=name, alpha_u=0.4, alpha_v=0.6, max_bounces=1)
     np.testing.assert_allclose(value, np.asarray(d) * g / (4 * i[2]), rtol=1e-4, atol=1e-6)
@@ -175,8 +171,8 @@ def test_double_precision_symmetric_value_is_reciprocal():
 
     def value(i, o):
         pair = Pair.of(i, o)
-        profile = Profile.along(GGX, pair.cos_azimuth, pair.sin_azimuth, llvm.Float64(0.3), llvm.Float64(0.5))
-        return np.asarray(symmetric(pair, i.z, profile, llvm.UInt(20), None)[1] * i.z)
+        tilts = Tilts.along(GGX(0.3, 0.5), pair.cos_azimuth, pair.sin_azimuth)
+        return np.asarray(symmetric(pair, i.z, tilts, llvm.UInt(20), None)[1] * i.z)
 
     np.testing.assert_allclose(value(i, o), value(o, i), rtol=1e-9)
 
@@ -205,13 +201,3 @@ def test_bad_input_is_named(rgb, given, message):
 
 def test_model_is_documented():
     assert {row.name for row in VGroove.rows()} >= {"alpha", "exponent", "max_bounces", "symmetric", "distribution"}
-
-
-def test_hashed_numbers_are_uniform_and_independent(rgb):
-    # Mitsuba's hash with its 4 rounds had correlations of .006 here, which made a per mille of single bounces double.
-    n = 2**21
-    given = variates(n, 3)
-    every = np.array([given[0], given[1].x, given[1].y, *_more_numbers(*given)], dtype=float)
-    limit = 5 / np.sqrt(n)  # 15 pairs: chance exceeds it once in 10^5
-    assert np.abs(np.corrcoef(every) - np.eye(6)).max() < limit
-    assert np.abs(every.mean(axis=1) - 0.5).max() < limit

@@ -12,7 +12,8 @@ import numpy as np
 from ...errors import ParameterError
 from ...goniophotometer.grooves import Grooves, Shape
 from ...goniophotometer.tile import opaque
-from ...microfacet.distributions import DISTRIBUTIONS, Profile, sample_azimuth
+from ...microfacet.distributions import DISTRIBUTIONS
+from .tilts import Tilts
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,13 @@ class ExplicitGrooves:
 
     def draw(self, rng: mi.PCG32) -> Shape:
         """Grooves by ground area: a facet with density D cos θ, and its partner."""
-        kind, (alpha_u, alpha_v) = DISTRIBUTIONS[self.distribution], opaque(mi.Point2f, self.alpha_u, self.alpha_v)
-        cos, sin = sample_azimuth(rng.next_float32(), alpha_u, alpha_v)
-        alpha = Profile.along(kind, cos, sin, alpha_u, alpha_v).alpha
-        first = dr.atan2(*kind.sample(alpha, rng.next_float32()))
+        distribution = DISTRIBUTIONS[self.distribution](*opaque(mi.Point2f, self.alpha_u, self.alpha_v))
+        cos, sin = distribution.sample_azimuth(rng.next_float32())
+        tilts = Tilts.along(distribution, cos, sin)
+        first = dr.atan2(*tilts.sample(rng.next_float32()))
         if self.symmetric:
             return Shape(mi.Vector2f(cos, sin), first, first)
-        partner = kind.sample_partner(alpha, *(rng.next_float32() for _ in range(3)))
+        partner = tilts.sample_partner(*(rng.next_float32() for _ in range(3)))
         return Shape(mi.Vector2f(cos, sin), first, dr.atan2(*partner))
 
 

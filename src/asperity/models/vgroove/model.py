@@ -12,9 +12,10 @@ import numpy as np
 from ...conductors import Conductor
 from ...errors import ParameterError
 from ...loading import load
-from ...microfacet.distributions import DISTRIBUTIONS, Profile, sample_azimuth
+from ...microfacet.distributions import DISTRIBUTIONS, Distribution
 from ...microfacet.fresnel import conductor
 from ...microfacet.numerics import clamp
+from ...microfacet.sampling import more_numbers
 from ...parameters import Choice, Declared, Flag, Integer, Texture, conflict, numbers, varies
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Metal, fit
@@ -22,6 +23,7 @@ from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
 from .symmetric import symmetric
+from .tilts import Tilts
 
 CITATION = """\
 @article{Lee2018Practical,
@@ -35,8 +37,6 @@ CITATION = """\
   doi     = {10.1145/3272127.3275016}
 }"""
 SMOOTHEST = 1e-3
-ROUNDS = 8
-"""Of the hash that makes three more random numbers: with Mitsuba's default of 4 they are correlated (0.6 %)."""
 TINY = 1e-20
 
 
@@ -119,9 +119,9 @@ class VGroove(Declared):
         active = active & (si.wi.z > 0) & (wo.z > 0)
         wi, wo = (dr.select(active, w, mi.Vector3f(0, 0, 1)) for w in (si.wi, wo))
         pair = Pair.of(wi, wo)
-        profile = self._profile(si, active, pair.cos_azimuth, pair.sin_azimuth)
+        tilts = Tilts.along(self._distribution(si, active), pair.cos_azimuth, pair.sin_azimuth)
         brdf = symmetric if self.symmetric else nonsymmetric
-        value, pdf = brdf(pair, wi.z, profile, self.most, self._metal(si, active))
+        value, pdf = brdf(pair, wi.z, tilts, self.most, self._metal(si, active))
         return dr.select(active, mi.UnpolarizedSpectrum(value), 0), dr.select(active, pdf, 0)
 
     def sample(self, ctx, si, sample1, sample2, active):
@@ -142,13 +142,13 @@ class VGroove(Declared):
 
     def draw(self, si, wi, sample1, sample2, active) -> tuple[Any, Any]:
         """(direction, number of bounces) of a ray that enters a groove anywhere."""
-        alpha_u, alpha_v = self._alphas(si, active)
-        x, y = sample_azimuth(sample2.y, alpha_u, alpha_v)
-        profile = Profile.along(DISTRIBUTIONS[self.distribution], x, y, alpha_u, alpha_v)
-        tilt = dr.atan2(*profile.kind.sample(profile.alpha, sample2.x))
+        distribution = self._distribution(si, active)
+        x, y = distribution.sample_azimuth(sample2.y)
+        tilts = Tilts.along(distribution, x, y)
+        tilt = dr.atan2(*tilts.sample(sample2.x))
         partner = tilt
         if not self.symmetric:
-            partner = dr.atan2(*profile.kind.sample_partner(profile.alpha, *_more_numbers(sample1, sample2)))
+            partner = dr.atan2(*tilts.sample_partner(*more_numbers(sample1, *sample2)))
         groove = Groove(tilt, partner)
         across = wi.x * x + wi.y * y
         psi, length = dr.atan2(across, wi.z), dr.sqrt(dr.square(across) + dr.square(wi.z))
@@ -168,8 +168,8 @@ class VGroove(Declared):
         u, v = (clamp(self.number(name, si, active), SMOOTHEST, largest) for name in self.axes)
         return u, v
 
-    def _profile(self, si, active, cos_azimuth, sin_azimuth) -> Profile:
-        return Profile.along(DISTRIBUTIONS[self.distribution], cos_azimuth, sin_azimuth, *self._alphas(si, active))
+    def _distribution(self, si, active) -> Distribution:
+        return DISTRIBUTIONS[self.distribution](*self._alphas(si, active))
 
     def _roughest(self) -> float | None:
         """Largest roughness, of the numbers that Mitsuba shows of a texture; None if it shows none."""
@@ -204,14 +204,3 @@ class VGroove(Declared):
         logarithm = fit(lambda cos: conductor(cos, eta, k))
         dr.make_opaque(logarithm)
         return logarithm
-
-
-def _more_numbers(sample1, sample2):
-    """Three more random numbers, by hashing those at hand (Zafar et al. 2010): `sample` draws six, and gets three.
-
-    A function of the given ones, so that equal numbers give equal samples.
-    """
-    a, b, c = (mi.UInt32(number * 2**24) for number in (sample1, sample2.x, sample2.y))
-    first, second = mi.sample_tea_32(mi.sample_tea_32(a, b, ROUNDS)[0], c, ROUNDS)
-    third, _ = mi.sample_tea_32(second, first, ROUNDS)
-    return tuple(mi.Float(word >> 8) * 2**-24 for word in (first, second, third))

@@ -18,11 +18,12 @@ from typing import Any
 
 import drjit as dr
 
-from ...microfacet.distributions import GGX, Beckmann, Phong, Profile
+from ...microfacet.distributions import GGX, Beckmann, Phong
 from ...microfacet.quadrature import accumulate, integrate
 from .fresnel import Metal, multiples, product, waves
 from .kaleidoscope import Pair
 from .symmetric import POLE, numbered
+from .tilts import Tilts
 
 NODES = {GGX: (6, 4, 5), Beckmann: (12, 4, 8), Phong: (12, 4, 8)}
 """For k = 1 and k = 2, in each piece between kinks, and for all others, whose share is small.
@@ -31,19 +32,19 @@ A density has to be exact to .05 % or so: what its integral misses looks like lo
 """
 
 
-def nonsymmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None) -> tuple[Any, Any]:
+def nonsymmetric(pair: Pair, cos_i, tilts: Tilts, most, metal: Metal | None) -> tuple[Any, Any]:
     """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``metal`` is None."""
     pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
-    captured = pair, profile, pole, () if metal is None else waves(metal.logarithm, pair.length)
+    captured = pair, tilts, pole, () if metal is None else waves(metal.logarithm, pair.length)
 
     def with_bounces(totals, counted, nodes, double):
         count, numbers = counted
 
         def term(index, captured):
-            (k, odd, tau), (pair, profile, pole, through) = numbers(index), captured
+            (k, odd, tau), (pair, tilts, pole, through) = numbers(index), captured
             p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
             way = Way(k, odd, tau * p, q)
-            weight, mean, variance = moments(way, profile, nodes, double)
+            weight, mean, variance = moments(way, tilts, nodes, double)
             weight = weight * 2 * pole / dr.select(odd, k + 1, k)
             if not through:
                 return (weight,)
@@ -55,12 +56,12 @@ def nonsymmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None)
 
         return accumulate(term, count, totals, captured)
 
-    few, double, multiple = NODES[profile.kind]
-    single, below = _single(pair, profile, few), limits(pair)
+    few, double, multiple = NODES[tilts.distribution]
+    single, below = _single(pair, tilts, few), limits(pair)
     totals = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
     totals = with_bounces(totals, numbered(below, dr.minimum(most, type(most)(2))), double, True)
     totals = with_bounces(totals, numbered(below, most, lowest=(3, 3, 4, 4)), multiple, False)
-    scale = dr.rcp(4 * cos_i * pair.cos_delta * (profile.scale * profile.kind.partner(profile.alpha)))
+    scale = dr.rcp(4 * cos_i * pair.cos_delta * tilts.partner())
     return scale * totals[-1], scale * totals[0]
 
 
@@ -83,28 +84,28 @@ def limits(pair: Pair):
     return odd(1), odd(-1), even(1), even(-1)
 
 
-def _single(pair: Pair, profile: Profile, nodes: int):
+def _single(pair: Pair, tilts: Tilts, nodes: int):
     """The integral of a single bounce, from a facet whose normal is the half vector.
 
     Over t with tan r = alpha tan t, in which D varies evenly, and on either side of the tilt that begins to shade.
     """
     l, x = (pair.sin_theta, pair.cos_theta), dr.sincos(pair.theta + pair.delta)
-    shade = dr.atan2(x[1], profile.alpha * x[0])
+    shade = dr.atan2(x[1], tilts.alpha * x[0])
 
     def at(node, captured):
-        total, (profile, l, x, shade) = 0, captured
-        alpha = profile.alpha
+        total, (tilts, l, x, shade) = 0, captured
+        alpha = tilts.alpha
         for low, high in ((0, shade), (shade, dr.pi / 2)):
             sin, cos = dr.sincos(low + (high - low) * node)
             stretch = dr.rsqrt(dr.square(alpha * sin) + dr.square(cos))
             r = alpha * sin * stretch, cos * stretch
             f_0, f_1, _ = _reaches(x, l, r)
-            weight = profile.density(*r) * r[0] * dr.maximum(f_1 - dr.maximum(f_0, 0), 0)
+            weight = tilts.density(*r) * r[0] * dr.maximum(f_1 - dr.maximum(f_0, 0), 0)
             total = total + (high - low) * alpha * dr.square(stretch) * weight
         return (total,)
 
-    (integral,) = integrate(at, nodes, (profile, l, x, shade), pair.theta)
-    return profile.density(*l) * integral
+    (integral,) = integrate(at, nodes, (tilts, l, x, shade), pair.theta)
+    return tilts.density(*l) * integral
 
 
 @dataclass
@@ -181,21 +182,21 @@ class Width:
         return dr.maximum(lit - dr.maximum(dr.maximum(f_0, f_next), 0), 0)
 
 
-def moments(way: Way, profile: Profile, nodes: int, double: bool):
+def moments(way: Way, tilts: Tilts, nodes: int, double: bool):
     """(integral of D(l) sin l D(r) sin r g' over r, mean r, variance of r); ``double`` tells that k = 2."""
     low, extent = way.interval()
     ends = way.kinks(low, low + extent) if double else (low, low + extent)
 
     def at(node, captured):
-        (way, profile, ends, width), sums = captured, [0, 0, 0]
+        (way, tilts, ends, width), sums = captured, [0, 0, 0]
         for begin, end in pairwise(ends):
             tilt = begin + (end - begin) * node
             l, r = dr.sincos(way.first_tilt(tilt)), dr.sincos(tilt)
-            weight = (end - begin) * profile.density(*l) * l[0] * profile.density(*r) * r[0] * width(l, r)
+            weight = (end - begin) * tilts.density(*l) * l[0] * tilts.density(*r) * r[0] * width(l, r)
             sums = [sums[0] + weight, sums[1] + weight * tilt, sums[2] + weight * tilt * tilt]
         return tuple(sums)
 
-    total, first, second = integrate(at, nodes, (way, profile, ends, Width.of(way)), way.p, nested=True)
+    total, first, second = integrate(at, nodes, (way, tilts, ends, Width.of(way)), way.p, nested=True)
     mean, square = (moment / dr.select(total > 1e-15, total, 1) for moment in (first, second))
     return total, mean, square - mean * mean
 

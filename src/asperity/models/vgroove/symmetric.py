@@ -18,40 +18,41 @@ from typing import Any
 
 import drjit as dr
 
-from ...microfacet.distributions import Profile
+from ...microfacet.masking import cavity_visible
 from ...microfacet.quadrature import accumulate
 from .fresnel import Metal, multiples, product, waves
 from .kaleidoscope import Pair
+from .tilts import Tilts
 
 POLE = 1e-4
 """Least sin theta: strictly parallel facets make a pole in the mirror direction. What is cut off holds 2e-4 of the
 energy of GGX with alpha 1, and less of others."""
 
 
-def symmetric(pair: Pair, cos_i, profile: Profile, most, metal: Metal | None) -> tuple[Any, Any]:
+def symmetric(pair: Pair, cos_i, tilts: Tilts, most, metal: Metal | None) -> tuple[Any, Any]:
     """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``metal`` is None."""
     pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
     count, numbers = numbered(limits(pair), most)
 
     def term(index, captured):
-        (k, odd, tau), (pole, profile, share, *through) = numbers(index), captured
+        (k, odd, tau), (pole, tilts, share, *through) = numbers(index), captured
         b = (dr.pi / 2 - tau * dr.select(odd, share.pair.theta, share.pair.delta)) / k
         sin, cos = dr.sincos(b)
-        value = pole * cos / k * profile.density(cos, sin) * share(odd, tau, sin, cos)
+        value = pole * cos / k * tilts.density(cos, sin) * share(odd, tau, sin, cos)
         return (value, *(value * reflectances(k, odd, tau, sin, cos) for reflectances in through))
 
-    single = profile.density(pair.sin_theta, pair.cos_theta) * cook_torrance_share(pair)
+    single = tilts.density(pair.sin_theta, pair.cos_theta) * cook_torrance_share(pair)
     start = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
-    captured = (pole, profile, Share.of(pair), *(() if metal is None else (Through.of(pair, metal),)))
+    captured = (pole, tilts, Share.of(pair), *(() if metal is None else (Through.of(pair, metal),)))
     totals = accumulate(term, count, start, captured)
     scale = dr.rcp(4 * cos_i * pair.cos_delta)
     return scale * totals[-1], scale * totals[0]
 
 
 def cook_torrance_share(pair: Pair):
-    """g of a single bounce: cos delta times the V-cavity's masking (Cook and Torrance 1982)."""
-    beyond = pair.cos_theta * pair.cos_delta - pair.sin_theta * pair.sin_delta  # cos of the steeper direction
-    return dr.maximum(dr.minimum(pair.cos_delta, 2 * pair.cos_theta * beyond), 0)
+    """g of a single bounce: what the steeper of the directions, which the cavity hides more, sees of the facet h."""
+    beyond = pair.cos_theta * pair.cos_delta - pair.sin_theta * pair.sin_delta  # its cosine; all are divided by l
+    return cavity_visible(pair.cos_delta, beyond, pair.cos_theta)
 
 
 def limits(pair: Pair):

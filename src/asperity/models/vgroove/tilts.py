@@ -1,0 +1,126 @@
+"""Tilts of a groove's facets, in the plane across it: of one that follows D, and of a partner of independent tilt.
+
+That of the partner has the density P(a) = D_iso sin^2 a / partner on (0, pi/2) (Lee et al. 2018, Eq. 20). It depends on
+the azimuth through alpha_phi only, since the scale of D cancels. The paper's normalisations (Appendix C) are wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import drjit as dr
+
+from ...microfacet.distributions import GGX, Beckmann, Distribution, Phong
+from ...microfacet.numerics import normalised, one_minus_exp
+
+
+@dataclass
+class Tilts:
+    """A distribution of normals along one azimuth; by default that of an isotropic one, along any."""
+
+    alpha: Any  # alpha_phi
+    scale: Any = 1
+
+    distribution: ClassVar[Any]  # its class: of these three, tilts need no more than the roughness
+
+    @staticmethod
+    def along(distribution: Distribution, cos_azimuth: Any, sin_azimuth: Any) -> Tilts:
+        """Those at this azimuth."""
+        return TILTS[type(distribution)](*distribution.along(cos_azimuth, sin_azimuth))
+
+    def density(self, sin: Any, cos: Any) -> Any:
+        """D(m) at the tilt with this sine and cosine."""
+        return self.scale * self.distribution.tilt_density(self.alpha, sin, cos)
+
+    def sample(self, u: Any) -> tuple[Any, Any]:
+        """(sin a, cos a) with density D_iso cos a per steradian, for ``u`` in [0, 1)."""
+        return self.distribution.sample_tilt(self.alpha, u)
+
+    def partner(self) -> Any:
+        """C, the integral of D sin^2 a over (0, pi/2)."""
+        return self.scale * self.isotropic_partner(self.alpha)
+
+    @staticmethod
+    def isotropic_partner(alpha: Any) -> Any:
+        """The integral of D_iso sin^2 a over (0, pi/2)."""
+        raise NotImplementedError
+
+    def sample_partner(self, u: Any, v: Any, w: Any) -> tuple[Any, Any]:
+        """(sin a, cos a) with density P, for three numbers in [0, 1)."""
+        raise NotImplementedError
+
+    @staticmethod
+    def slope(alpha: float, share: float) -> float:
+        """Slope that this share of the projected facets exceeds."""
+        raise NotImplementedError
+
+
+class GGXTilts(Tilts):
+    """Of GGX."""
+
+    distribution = GGX
+
+    @staticmethod
+    def isotropic_partner(alpha: Any) -> Any:
+        """A quarter of the roughness."""
+        return alpha / 4
+
+    def sample_partner(self, u: Any, v: Any, w: Any) -> tuple[Any, Any]:
+        """With q, the abscissa of a point in a quarter of the disc, tan a is alpha sqrt(1 - q^2) / q."""
+        q = dr.sqrt(u) * dr.cos(dr.pi / 2 * v)
+        return normalised(self.alpha * dr.safe_sqrt(1 - q * q), q)
+
+    @staticmethod
+    def slope(alpha: float, share: float) -> float:
+        """Slope that this share of the projected facets exceeds."""
+        return alpha * math.sqrt((1 - share) / share)
+
+
+class BeckmannTilts(Tilts):
+    """Of Beckmann."""
+
+    distribution = Beckmann
+
+    @staticmethod
+    def isotropic_partner(alpha: Any) -> Any:
+        """An integral of a Gaussian."""
+        return alpha / (4 * math.sqrt(math.pi))
+
+    def sample_partner(self, u: Any, v: Any, w: Any) -> tuple[Any, Any]:
+        """(tan a / alpha)^2 is an exponential variate plus half a squared normal one."""
+        return normalised(self.alpha * dr.sqrt(dr.square(dr.erfinv(v)) - dr.log(1 - u)), 1)
+
+    @staticmethod
+    def slope(alpha: float, share: float) -> float:
+        """Slope that this share of the projected facets exceeds."""
+        return alpha * math.sqrt(-math.log(share))
+
+
+class PhongTilts(Tilts):
+    """Of Phong."""
+
+    distribution = Phong
+
+    @staticmethod
+    def isotropic_partner(alpha: Any) -> Any:
+        """(n + 2) Gamma((n + 1) / 2) / (8 sqrt(pi) Gamma((n + 4) / 2))."""
+        n = Phong.exponent(alpha)
+        return (n + 2) / (8 * math.sqrt(math.pi)) * dr.exp(dr.lgamma((n + 1) / 2) - dr.lgamma((n + 4) / 2))
+
+    def sample_partner(self, u: Any, v: Any, w: Any) -> tuple[Any, Any]:
+        """cos^2 a is a beta variate times a power."""
+        n = Phong.exponent(self.alpha)
+        radius = one_minus_exp(-2 / dr.maximum(n, 1e-4) * dr.log(1 - u))
+        square = (1 - radius * dr.square(dr.cos(2 * dr.pi * v))) * dr.exp(2 / (n + 2) * dr.log(1 - w))
+        return dr.safe_sqrt(1 - square), dr.sqrt(square)
+
+    @staticmethod
+    def slope(alpha: float, share: float) -> float:
+        """Slope that this share of the projected facets exceeds."""
+        return math.sqrt(share ** -(alpha**2) - 1)
+
+
+TILTS: dict[Any, type[Tilts]] = {kind.distribution: kind for kind in (GGXTilts, BeckmannTilts, PhongTilts)}
+"""By the class of the distribution."""
