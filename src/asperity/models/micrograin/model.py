@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from ...conductors import Conductor
 from ...errors import ParameterError
@@ -17,9 +17,10 @@ from ...microfacet.fresnel import Dielectric, conductor
 from ...microfacet.ggx import lift, normal_in_sphere_space, to_sphere
 from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import gauss_legendre
+from ...microfacet.tables import Made
 from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict, varies
 from . import smith
-from .compensation import SPARSEST, LossTable, lobe
+from .compensation import SPARSEST, LossTable, returned
 from .diffuse import lambertian
 from .grains import Share, density, exposure, sample_visible_normal, visible_fraction
 from .microgeometry import ExplicitGrains
@@ -87,7 +88,6 @@ class Micrograin(Declared):
     """
 
     citation = CITATION
-    table_betas: tuple[float, float] | None = None
 
     tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1, steep=True)
     beta = Texture(
@@ -152,8 +152,7 @@ class Micrograin(Declared):
         for name in unused:
             setattr(self, name, None)
         self.lobes = self._lobes()
-        if self.scattering == "multiple":
-            self.constant = {"beta", "beta_x", "beta_y"}  # they make the table
+        self.losses = Made()
 
     def _lobes(self) -> list[Lobe]:
         front = mi.BSDFFlags.FrontSide | (0 if self.isotropic else mi.BSDFFlags.Anisotropic)
@@ -178,10 +177,9 @@ class Micrograin(Declared):
     def update(self) -> None:
         """Bring up to date what is made from the parameters."""
         if self.scattering == "multiple":
-            beta_x, beta_y = (self._constant(getattr(self, name)) for name in self.axes)
-            if (beta_x, beta_y) != self.table_betas:
-                shaded = Shadows.union if self.masking == "correlated" else Shadows.sum
-                self.table, self.table_betas = LossTable.made(beta_x, beta_y, self.diffuse, shaded), (beta_x, beta_y)
+            shaded = Shadows.union if self.masking == "correlated" else Shadows.sum
+            beta = [self._constant(getattr(self, name)) for name in dict.fromkeys(self.axes)]
+            self.losses.update(partial(LossTable.made, self.diffuse, shaded), *beta)
 
     def eval_pdf(self, ctx, si, wo, active):
         """(f |cos_o|, solid-angle density of `sample`): the sum of the lobes (Lucas 2024, Eq. 20)."""
@@ -347,7 +345,7 @@ class Micrograin(Declared):
         return value, pdf / grains.visible(wi)
 
     def _weigh_multiple(self, si, active, grains, wi):
-        return sum(self.table.along(grains.tau_0, wi))
+        return sum(self.losses.result.along(grains.tau_0, grains.to_sphere(wi)))
 
     def _draw_multiple(self, si, active, grains, wi, u, sample2):
         return mi.warp.square_to_cosine_hemisphere(sample2)
@@ -356,11 +354,12 @@ class Micrograin(Declared):
         """Light that single scattering loses (`compensation`), by cosine."""
         # Few grains do not pass light to each other: what they return is proportional to their number.
         tau_0 = dr.maximum(grains.tau_0, SPARSEST)
-        lost_i, lost_o = (self.table.along(tau_0, w) for w in (wi, wo))
+        losses = self.losses.result
+        lost_i, lost_o = (losses.along(tau_0, grains.to_sphere(w)) for w in (wi, wo))
         base = mi.UnpolarizedSpectrum(0)
         if self.base is not None:
             base = clamp(self._base_albedo(si, active), 0, 1)
-        value = lobe(tau_0, self.table.at(tau_0), lost_i, lost_o, self._mean_albedo(si, active), base)
+        value = returned(tau_0, losses.at(tau_0), lost_i, lost_o, self._mean_albedo(si, active), base)
         return value * (wo.z * grains.tau_0 / tau_0), wo.z / dr.pi
 
     def _visible_normal(self, grains: Grains, wi, sample2):
@@ -418,10 +417,10 @@ class Micrograin(Declared):
 
         return directional_albedo(reflected, upright, active, 16, copies=True)
 
-    def _constant(self, beta) -> float:
+    def _constant(self, beta: Any) -> Any:
         if varies(beta):
             raise ParameterError('beta: a texture, which scattering = "multiple" does not allow; tau_0 may be one.')
-        return float(np.asarray(beta.mean()).item())
+        return beta.mean()
 
     def _fresnel(self, si, active, cos, h, m):
         """Reflectance of the grain at height ``h`` with normal ``m``."""
