@@ -3,6 +3,40 @@
 Not in the paper, whose model is single scattering. The idea is Kulla and Conty's (2017), for two materials: light that
 is lost after meeting a grain or the base first is returned spread like that loss. How often it meets either again
 follows from the exact form factors of the furnace. Reciprocal; closes the white furnace; no fitted constants.
+
+Exchange. Over a unit of the plane, grains (S) expose the area H, the base (B) exposes 1 - tau_0. What one sends to
+another in uniform radiosity, area times form factor, is the same both ways, and adds up to the area:
+
+    T     = mean of tau_i         sky to grains: tau_i is the visible fraction, means are hemispherical, by cosine
+    1 - T                         sky to base
+    K_SB  = T - tau_0             base to grains: the rest of 1 - tau_0, for the base sends nothing to itself
+    K_SS  = H - T - K_SB          grains to grains: the rest of H
+    l_S   = K_SS + K_SB = H - T   grains to anything but the sky
+    l_B   = K_SB                  base to anything but the sky
+
+One lost path. Of light along i, L_X(i) meets species X first, S or B, and would be blocked from the sky if X were
+white: that is what single scattering loses, with its directions and mirrors. X reflects a_X of it. Take it to be spread
+over what meets X's surroundings as uniform light from X would be: K_XY / l_X of it arrives at Y. Look back along o in
+the same way: L_Y(o) comes from Y and got there from something else, not from the sky, spread over l_Y. So a path with
+two vertices has the BRDF 1 / pi a_X L_X(i) K_XY / (l_X l_Y) a_Y L_Y(o).
+
+All lost paths. What falls on Z in between leaves it as the radiosity P_Z, albedo over area: P_S = a_S / H and
+P_B = a_B / (1 - tau_0). With any number of vertices in between, K becomes K + K P K + K P K P K + ..., that is
+
+    S_XY = (K (1 - P K)^-1)_XY / (l_X l_Y),    K = | K_SS  K_SB |
+                                                   | K_SB   0   |
+
+    S_SS = (K_SS + K_SB^2 P_B) / (l_S^2 D),    S_SB = 1 / (l_S D),    S_BB = P_S / D,
+    D = det(1 - P K) = 1 - K_SS P_S - K_SB^2 P_S P_B.
+
+The furnace. Were losses diffuse, their means m_X would be T l_S / H and (1 - T) l_B / (1 - tau_0), and all that was lost
+would come back in the white furnace. They are not, so L_X is scaled by d_X, such that it does for any i:
+
+    f = 1 / pi sum_XY (a_X d_X L_X(i)) S_XY (a_Y d_Y L_Y(o)),    d_X sum_Y S_XY d_Y m_Y = 1  with S of a_S = a_B = 1.
+
+Divided by each other, the two equations are quadratic in q = d_B / d_S:
+
+    S_BB m_B q^2 + S_SB (m_S - m_B) q - S_SS m_S = 0,    d_S = 1 / sqrt(S_SS m_S + S_SB m_B q).
 """
 
 from __future__ import annotations
@@ -12,19 +46,21 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
-from scipy.stats import qmc
 
-from ...microfacet.ggx import GRAZING, lift, to_sphere
+from ...microfacet.ggx import GRAZING, lift, normal_in_sphere_space, to_sphere
+from ...microfacet.numerics import ONE_BELOW
+from ...microfacet.quadrature import accumulate
+from ...microfacet.tables import Table, array_types
 from .grains import density, sample_visible_normal, visible_fraction
 from .shadows import Shadows, shadow
 
 FILLINGS, COSINES, AZIMUTHS = 25, 48, 7
 """Nodes of the tables: in arcsin(sqrt(tau_0)), and in sphere space, where losses vary evenly whatever beta: in the root
 of the cosine, and in the azimuth of the first quadrant."""
-SAMPLES = 4096
+SAMPLES, AT_ONCE = 4096, 64
+"""Quasi-random points a node, and how many of them are lanes: the others are in a loop, whose derivatives take no
+memory."""
 SPARSEST = 1e-4
 """Least filling factor of the tables."""
 
@@ -32,160 +68,204 @@ SPARSEST = 1e-4
 class Loss(NamedTuple):
     """What single scattering loses at one filling factor if all is white, and how often it would be met again."""
 
-    mean_grain: Any  # hemispherical means of the two losses
+    mean_grain: Any  # hemispherical means of the two losses, m_S and m_B
     mean_base: Any
-    visible: Any  # hemispherical mean of the grains' visible fraction, tau_avg
-    area: Any  # exposed area of the grains over that of the plane, H_S
+    visible: Any  # hemispherical mean of the grains' visible fraction, T
+    area: Any  # exposed area of the grains over that of the plane, H
 
 
 @dataclass
 class LossTable:
-    """Losses for constant ``beta_x`` and ``beta_y`` and any filling factor, as ratios to it.
+    """Losses for constant beta and any filling factor, as ratios to it, which are finite where tau_0 is small."""
 
-    All of it is proportional to tau_0 where that is small.
-    """
-
-    beta_x: float
-    beta_y: float
-    losses: Any  # L_S and L_B over azimuth, cosine and filling factor
-    means: Any  # of `Loss`, over the filling factor
+    losses: Table  # L_S and L_B over filling factor, cosine and azimuth
+    means: Table  # of `Loss`, over the filling factor
 
     @classmethod
-    def made(cls, beta_x: float, beta_y: float, diffuse: bool, shaded: Callable[[Shadows, Any], Any]) -> LossTable:
-        """The table for ``diffuse`` grains, or mirrors; ``shaded(shadows, h)`` is the choice of masking."""
-        tau_0 = np.maximum(np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2, SPARSEST)  # dense at both ends
-        azimuths = 1 if beta_x == beta_y else AZIMUTHS
-        root, azimuth = np.linspace(0, 1, COSINES), np.linspace(0, np.pi / 2, azimuths)
-        grid = np.meshgrid(tau_0, np.maximum(root**2, GRAZING), azimuth, indexing="ij")
-        losses, visible = _losses(grid[0], grid[1], grid[2], beta_x, beta_y, diffuse, shaded)
-        mean = _hemispherical_mean(np.concatenate([losses, visible], axis=-1), root, azimuth, beta_x, beta_y)
-        means = np.column_stack([mean, _exposed_area(tau_0, beta_x, beta_y)])
-        losses, means = losses / tau_0[:, None, None, None], means / tau_0[:, None]
-        return cls(beta_x, beta_y, _table(mi.Texture3f, losses), _table(mi.Texture1f, means))
+    def made(cls, diffuse: bool, shaded: Callable[[Shadows, Any], Any], *beta: Any) -> LossTable:
+        """The table for ``diffuse`` grains, or mirrors; ``shaded(shadows, h)`` is the choice of masking.
 
-    def at(self, tau_0) -> Loss:
-        """What depends on the filling factor alone."""
-        return Loss(*(tau_0 * mean for mean in self.means.eval(_centre(_filling(tau_0), FILLINGS))))
-
-    def along(self, tau_0, w):
-        """(L_S, L_B): shares of the light along ``w`` that meet grain or base first and are lost."""
-        w = to_sphere(lift(w, self.beta_x, self.beta_y), self.beta_x, self.beta_y)
-        azimuth = dr.atan2(dr.abs(w.y), dr.abs(w.x) + 1e-12) * (2 / dr.pi)
-        at = (
-            _centre(azimuth, self.losses.shape[2]),
-            _centre(dr.sqrt(w.z), COSINES),
-            _centre(_filling(tau_0), FILLINGS),
+        ``beta`` is one number, or those along x and y. If it carries derivatives, so does the table.
+        """
+        Float, Vector = array_types('scattering = "multiple"')
+        nodes = Nodes.of(beta, Float, Vector)
+        losses = nodes.losses(diffuse, shaded)
+        means = [*nodes.means(Table.of(nodes.shape, losses)), nodes.exposed_area()]
+        per_node = dr.repeat(nodes.tau_0, dr.width(nodes.r) // FILLINGS)
+        return cls(
+            Table.of(nodes.shape, [loss / per_node for loss in losses[:2]]),
+            Table.of((FILLINGS,), [mean / nodes.tau_0 for mean in means]),
         )
-        return [tau_0 * loss for loss in self.losses.eval(mi.Point3f(*at))]
+
+    def at(self, tau_0: Any) -> Loss:
+        """What depends on the filling factor alone."""
+        return Loss(*(tau_0 * mean for mean in self.means.at(_filling(tau_0))))
+
+    def along(self, tau_0: Any, w: Any) -> list[Any]:
+        """[L_S, L_B]: shares of the light along ``w``, in sphere space, that meet grain or base first and are lost."""
+        azimuth = dr.atan2(dr.abs(w.y), dr.abs(w.x) + 1e-12) * (2 / dr.pi)
+        return [tau_0 * loss for loss in self.losses.at(_filling(tau_0), dr.sqrt(w.z), azimuth)]
 
 
-def lobe(tau_0, loss: Loss, lost_i, lost_o, grain, base):
+def returned(tau_0: Any, loss: Loss, lost_i: Any, lost_o: Any, grain: Any, base: Any) -> Any:
     """BRDF of the returned light, for albedos ``grain`` and ``base`` (spectra) and losses (L_S, L_B) along i and o.
 
-    ``blocked`` and ``between`` are the fluxes that grains pass to grains, and to the base and back.
+    Symbols as above. Few grains and many leave areas without meaning, 0 / 0: these are kept off zero.
     """
-    between = dr.maximum(loss.visible - tau_0, 1e-6)
-    lost = dr.maximum(loss.area - loss.visible, 1e-6)
-    blocked = dr.maximum(lost - between, 0)
+    H, T = loss.area, loss.visible
+    K_SB, l_S = dr.maximum(T - tau_0, 1e-6), dr.maximum(H - T, 1e-6)
+    K_SS = dr.maximum(l_S - K_SB, 0)
 
-    def exchange(grain, base):
-        """The matrix S: (grain-grain, grain-base, base-base)."""
-        x, y = grain / loss.area, base / dr.maximum(1 - tau_0, 1e-6)
-        scale = dr.rcp(1 - blocked * x - between * between * x * y)
-        return (blocked + between * between * y) / (lost * lost) * scale, scale / lost, x * scale
+    def exchange(a_S: Any, a_B: Any) -> tuple[Any, Any, Any]:
+        """(S_SS, S_SB, S_BB)."""
+        P_S, P_B = a_S / H, a_B / dr.maximum(1 - tau_0, 1e-6)
+        scale = dr.rcp(1 - K_SS * P_S - K_SB * K_SB * P_S * P_B)
+        return (K_SS + K_SB * K_SB * P_B) / (l_S * l_S) * scale, scale / l_S, P_S * scale
 
-    # d_S, d_B: the symmetric scaling that makes the lobe return, in the white furnace, exactly what was lost.
-    s, m, b = exchange(1, 1)
-    mean_s, mean_b = dr.maximum(loss.mean_grain, 1e-7), dr.maximum(loss.mean_base, 1e-7)
-    middle = m * (mean_s - mean_b)
-    ratio = (dr.sqrt(middle * middle + 4 * s * b * mean_s * mean_b) - middle) / (2 * b * mean_b)
-    d_s = dr.rsqrt(s * mean_s + m * mean_b * ratio)
-    d_b = ratio * d_s
+    S_SS, S_SB, S_BB = exchange(1, 1)
+    m_S, m_B = dr.maximum(loss.mean_grain, 1e-7), dr.maximum(loss.mean_base, 1e-7)
+    middle = S_SB * (m_S - m_B)
+    q = (dr.sqrt(middle * middle + 4 * S_SS * S_BB * m_S * m_B) - middle) / (2 * S_BB * m_B)
+    d_S = dr.rsqrt(S_SS * m_S + S_SB * m_B * q)
+    d_B = q * d_S
 
-    s, m, b = exchange(grain, base)
-    s_i, s_o = grain * (d_s * lost_i[0]), grain * (d_s * lost_o[0])
-    b_i, b_o = base * (d_b * lost_i[1]), base * (d_b * lost_o[1])
-    return (s_i * s * s_o + m * (s_i * b_o + b_i * s_o) + b_i * b * b_o) / dr.pi
-
-
-def _losses(tau_0, cos, azimuth, beta_x, beta_y, diffuse, shaded):
-    """(L_S, L_B) and tau_i on a grid of filling factors and directions in sphere space, by quasi-Monte Carlo."""
-    Float, Vector = _array_types()
-
-    def spread(x):
-        return dr.repeat(Float(np.ascontiguousarray(x.ravel(), dtype=np.float32)), SAMPLES)
-
-    r, sin = density(spread(tau_0)), np.sqrt(1 - cos * cos)
-    i = Vector(spread(sin * np.cos(azimuth)), spread(sin * np.sin(azimuth)), spread(cos))
-    wi = dr.normalize(Vector(i.x / beta_x, i.y / beta_y, i.z))
-    points = qmc.Sobol(4, seed=0).random(SAMPLES).T.astype(np.float32)
-    u = [dr.tile(Float(np.minimum(point, np.float32(1 - 2**-24))), cos.size) for point in points]
-
-    m = sample_visible_normal(r, i, u[0], u[1])
-    h, m = m.z, dr.normalize(Vector(beta_x * m.x, beta_y * m.y, m.z))
-    cosine = _cosine_hemisphere(Vector, u[2], u[3])
-    wo = _about(m, cosine) if diffuse else 2 * dr.dot(wi, m) * m - wi
-
-    def blocked(wo, h):  # of what is seen along i at height h, the share that is in shadow along wo
-        o = to_sphere(lift(wo, beta_x, beta_y), beta_x, beta_y)
-        return 1 - dr.select(wo.z > 0, dr.exp(-r * (shaded(Shadows(i, o), h) - shadow(i, h))), 0)
-
-    visible = visible_fraction(r, i)
-    columns = visible * blocked(wo, h), (1 - visible) * blocked(cosine, Float(0)), visible
-    columns = [dr.block_sum(column, SAMPLES).numpy().reshape(cos.shape) / SAMPLES for column in columns]
-    return np.stack(columns[:2], axis=-1), columns[2][..., None]
+    S_SS, S_SB, S_BB = exchange(grain, base)
+    S_i, S_o = grain * (d_S * lost_i[0]), grain * (d_S * lost_o[0])
+    B_i, B_o = base * (d_B * lost_i[1]), base * (d_B * lost_o[1])
+    return (S_i * S_SS * S_o + S_SB * (S_i * B_o + B_i * S_o) + B_i * S_BB * B_o) / dr.pi
 
 
-def _exposed_area(tau_0, beta_x, beta_y):
-    """H_S = tau_0 int D dm = r int int exp(-r pi (1 - h^2)) |E m'| dh dphi."""
-    r = -np.log1p(-np.minimum(tau_0, 1 - 1e-6))[:, None, None] / np.pi
-    h, azimuth = ((np.arange(64) + 0.5) / 64)[:, None], (np.arange(64) + 0.5) / 64 * 2 * np.pi
-    x, y = (np.sqrt(1 - h * h) * f(azimuth) for f in (np.cos, np.sin))
-    stretch = np.sqrt((beta_x * x) ** 2 + (beta_y * y) ** 2 + h * h)
-    return (r * np.exp(-r * np.pi * (1 - h * h)) * stretch).mean(axis=(1, 2)) * 2 * np.pi
+@dataclass
+class Nodes:
+    """Nodes of the losses: each filling factor with each direction of the first quadrant, in sphere space."""
+
+    shape: tuple[int, int, int]  # numbers of filling factors, cosines and azimuths
+    tau_0: Any  # the filling factors alone
+    r: Any  # density and direction at each node
+    i: Any
+    beta_x: Any
+    beta_y: Any
+
+    @classmethod
+    def of(cls, beta: tuple, Float: Any, Vector: Any) -> Nodes:
+        """Arrays of these types; one azimuth where all are alike."""
+        beta_x, beta_y = Float(beta[0]), Float(beta[-1])
+        alike = len(beta) == 1 or (not dr.grad_enabled(beta) and bool(dr.all(beta_x == beta_y)))
+        tau_0 = np.maximum(np.sin(np.linspace(0, np.pi / 2, FILLINGS)) ** 2, SPARSEST)  # dense at both ends
+        root, azimuth = np.linspace(0, 1, COSINES), np.linspace(0, np.pi / 2, 1 if alike else AZIMUTHS)
+        grid = np.meshgrid(tau_0, np.maximum(root**2, GRAZING), azimuth, indexing="ij")
+        filling, cos, azimuth = (x.ravel() for x in grid)
+        sin = np.sqrt(1 - cos * cos)
+        i = Vector(*(Float(x.astype(np.float32)) for x in (sin * np.cos(azimuth), sin * np.sin(azimuth), cos)))
+        r = density(Float(filling.astype(np.float32)))
+        return cls(grid[0].shape, Float(tau_0.astype(np.float32)), r, i, beta_x, beta_y)
+
+    def losses(self, diffuse: bool, shaded: Callable[[Shadows, Any], Any]) -> list[Any]:
+        """[L_S, L_B, tau_i] at every node, by quasi-Monte Carlo."""
+        from scipy.stats import qmc  # here, since to import it takes as long as to import Mitsuba
+
+        Float, Vector, nodes = type(self.r), type(self.i), dr.width(self.r)
+        UInt = dr.uint32_array_t(Float)
+        points = [
+            Float(np.minimum(p, np.float32(ONE_BELOW)))
+            for p in qmc.Sobol(4, seed=0).random(SAMPLES).T.astype(np.float32)
+        ]
+        node = dr.repeat(dr.arange(UInt, nodes), AT_ONCE)
+        first = dr.tile(dr.arange(UInt, AT_ONCE), nodes) * (SAMPLES // AT_ONCE)
+        r, i = dr.gather(Float, self.r, node), dr.gather(Vector, self.i, node)
+        scatter = _scattered if diffuse else _reflected
+
+        def blocked(index: Any, beta: tuple) -> tuple[Any, Any]:
+            """Of light that has met a grain, or the base, the share that is in shadow then."""
+            u, v, *more = (dr.gather(Float, point, first + index) for point in points)
+            cosine = _cosine_hemisphere(Vector, *more)
+            wo, h, weight = scatter(r, i, sample_visible_normal(r, i, u, v), cosine, *beta)
+            free = [exposed(wo, h, beta), exposed(cosine, Float(0), beta)]
+            return 1 - weight * free[0], 1 - free[1]
+
+        def exposed(wo: Any, h: Any, beta: tuple) -> Any:
+            """Of what is seen along i at height ``h``, the share that is not in shadow along ``wo``."""
+            o = to_sphere(lift(wo, *beta), *beta)
+            return dr.select(wo.z > 0, dr.exp(-r * (shaded(Shadows(i, o), h) - shadow(i, h))), 0)
+
+        start = dr.zeros(Float, nodes * AT_ONCE)
+        sums = accumulate(blocked, UInt(SAMPLES // AT_ONCE), (start, start), (self.beta_x, self.beta_y))
+        grain, base = (dr.block_sum(total, AT_ONCE) / SAMPLES for total in sums)
+        visible = visible_fraction(self.r, self.i)
+        return [visible * grain, (1 - visible) * base, visible]
+
+    def means(self, table: Table) -> list[Any]:
+        """Hemispherical means of a ``table`` on these nodes: 2 int int L cos dcos dazimuth / (2 pi), real directions."""
+        Float = type(self.r)
+        UInt = dr.uint32_array_t(Float)
+        squares, turns = 512, 128
+        lane = dr.arange(UInt, FILLINGS * turns)
+        sin_turn, cos_turn = dr.sincos((Float(lane % turns) + 0.5) * (np.pi / (2 * turns)))
+        filling = Float(lane // turns) / (FILLINGS - 1)
+
+        def along(index: Any, captured: tuple) -> tuple:
+            table, beta_x, beta_y = captured
+            square = (Float(index) + 0.5) / squares
+            sin = dr.sqrt(1 - square)
+            x, y = beta_x * sin * cos_turn, beta_y * sin * sin_turn
+            cos = dr.sqrt(square / (x * x + y * y + square))
+            return tuple(table.at(filling, dr.sqrt(cos), dr.atan2(y, x) * (2 / dr.pi)))
+
+        start = (dr.zeros(Float, dr.width(lane)),) * table.channels
+        sums = accumulate(along, UInt(squares), start, (table, self.beta_x, self.beta_y))
+        return [dr.block_sum(total, turns) / (squares * turns) for total in sums]
+
+    def exposed_area(self) -> Any:
+        """H = tau_0 int D dm = r int int exp(-r pi (1 - h^2)) |E m'| dh dphi, for each filling factor."""
+        Float, n = type(self.r), 64
+        middles = (np.arange(n) + 0.5) / n
+        tau_0, h, turn = (x.ravel() for x in np.meshgrid(self.tau_0.numpy().astype(float), middles, middles, indexing="ij"))
+        r, sin, turn = -np.log1p(-np.minimum(tau_0, 1 - 1e-6)) / np.pi, np.sqrt(1 - h * h), 2 * np.pi * turn
+        numbers = r * np.exp(-r * np.pi * (1 - h * h)), sin * np.cos(turn), sin * np.sin(turn), h
+        exposed, x, y, h = (Float(x.astype(np.float32)) for x in numbers)
+        area = exposed * dr.sqrt(dr.square(self.beta_x * x) + dr.square(self.beta_y * y) + h * h)
+        return dr.block_sum(dr.block_sum(area, n), n) * (2 * np.pi / (n * n))
 
 
-def _hemispherical_mean(table, root, azimuth, beta_x, beta_y):
-    """2 int int L cos dcos dazimuth / (2 pi) over real directions, for an L linear between the nodes of ``table``."""
-    square, turn = np.meshgrid((np.arange(512) + 0.5) / 512, (np.arange(128) + 0.5) / 256 * np.pi, indexing="ij")
-    x, y = (np.sqrt(1 - square) * f(turn) for f in (np.cos, np.sin))
-    cos = np.sqrt(square / ((beta_x * x) ** 2 + (beta_y * y) ** 2 + square))
-    at = np.sqrt(cos), np.arctan2(beta_y * y, beta_x * x)
-    if len(azimuth) == 1:
-        table, azimuth = np.repeat(table, 2, axis=2), np.array([0, np.pi / 2])
-    return np.array([RegularGridInterpolator((root, azimuth), layer)(at).mean(axis=(0, 1)) for layer in table])
+def _scattered(r: Any, i: Any, point: Any, cosine: Any, beta_x: Any, beta_y: Any) -> tuple[Any, Any, Any]:
+    """(wo, height, weight) of light from a diffuse grain's visible ``point`` m', along ``cosine`` about its normal.
+
+    The weight is 1, and carries the derivative: of the density of wo, at a fixed wo. Were wo to move instead, it would
+    cross the horizon, where all light is lost at once.
+    """
+    m = dr.normalize(type(i)(beta_x * point.x, beta_y * point.y, point.z))
+    wo = _about(m, cosine)
+    if not dr.grad_enabled(wo):
+        return wo, point.z, 1
+    wo = dr.detach(wo)
+    density = dr.dot(m, wo)
+    return wo, point.z, density / dr.detach(density)
 
 
-def _table(texture, data):
-    data = mi.TensorXf(np.ascontiguousarray(data, dtype=np.float32))
-    return texture(data, filter_mode=dr.FilterMode.Linear, wrap_mode=dr.WrapMode.Clamp)
+def _reflected(r: Any, i: Any, point: Any, cosine: Any, beta_x: Any, beta_y: Any) -> tuple[Any, Any, Any]:
+    """The same of light from a mirror's ``point``: at a fixed wo, its height changes (density: Lucas 2024, Eq. 22)."""
+    m = dr.normalize(type(i)(beta_x * point.x, beta_y * point.y, point.z))
+    wi = dr.normalize(type(i)(i.x / beta_x, i.y / beta_y, i.z))
+    wo = 2 * dr.dot(wi, m) * m - wi
+    if not dr.grad_enabled(wo):
+        return wo, point.z, 1
+    wo = dr.detach(wo)
+    h, ggx = normal_in_sphere_space(dr.normalize(wi + dr.select(wo.z > 0, wo, wi)), beta_x, beta_y)
+    log_density = dr.log(ggx / wi.z) - r * (dr.pi * (1 - h * h) + shadow(i, h))
+    return wo, dr.replace_grad(point.z, h), dr.replace_grad(type(r)(1), log_density)
 
 
-def _centre(x, n: int):
-    """Texture coordinate at which a table of ``n`` nodes from 0 to 1 has the value for x."""
-    return (x * (n - 1) + 0.5) / n
-
-
-def _filling(tau_0):
+def _filling(tau_0: Any) -> Any:
     """The tables' coordinate in [0, 1]."""
     return dr.atan2(dr.sqrt(dr.maximum(tau_0, 1e-6)), dr.sqrt(dr.maximum(1 - tau_0, 1e-6))) * (2 / dr.pi)
 
 
-def _array_types():
-    """Arrays to compute tables with: the variant's own, or LLVM's where that is scalar."""
-    if dr.is_jit_v(mi.Float):
-        return mi.Float, mi.Vector3f
-    import drjit.llvm as llvm
-
-    return llvm.Float, llvm.Array3f
-
-
-def _cosine_hemisphere(Vector, u, v):
+def _cosine_hemisphere(Vector: Any, u: Any, v: Any) -> Any:
     radius, (sin, cos) = dr.sqrt(u), dr.sincos(2 * dr.pi * v)
     return Vector(radius * cos, radius * sin, dr.safe_sqrt(1 - u))
 
 
-def _about(n, w):
+def _about(n: Any, w: Any) -> Any:
     """Turn ``w`` from about the z axis to about ``n`` (Duff et al. 2017), n.z >= 0."""
     a = -dr.rcp(1 + n.z)
     b = n.x * n.y * a

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from ...conductors import Conductor
 from ...errors import ParameterError
 from ...loading import load
 from ...microfacet.albedo import directional_albedo
 from ...microfacet.fresnel import Dielectric, conductor
-from ...microfacet.ggx import normal_in_sphere_space
+from ...microfacet.ggx import lift, normal_in_sphere_space, to_sphere
 from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import gauss_legendre
+from ...microfacet.tables import Made
 from ...parameters import BSDF, Choice, Colour, Declared, Flag, Ior, Texture, conflict, varies
 from . import smith
-from .compensation import SPARSEST, LossTable, lobe
-from .diffuse import Facet, lambertian
-from .grains import Grains, SecondColour, exposure, sample_visible_normal
+from .compensation import SPARSEST, LossTable, returned
+from .diffuse import lambertian
+from .grains import Share, density, exposure, sample_visible_normal, visible_fraction
 from .microgeometry import ExplicitGrains
 from .shadows import Shadows, shadow
 
@@ -42,6 +43,27 @@ ALL_COMPONENTS = 0xFFFFFFFF
 METAL = {"material", "eta", "k", "reflectivity", "edge_tint"}
 COAT = {"int_ior", "ext_ior"}
 ALBEDO = {"diffuse_reflectance", "diffuse_reflectance_2"}
+
+
+class Grains(NamedTuple):
+    """The grains at a surface point."""
+
+    tau_0: Any
+    r: Any  # density in sphere space
+    beta_x: Any
+    beta_y: Any
+
+    def to_sphere(self, w):
+        """A direction in sphere space."""
+        return to_sphere(w, self.beta_x, self.beta_y)
+
+    def lift(self, w):
+        """A direction kept off the horizon; those from below are meaningless then, and masked by the caller."""
+        return lift(w, self.beta_x, self.beta_y)
+
+    def visible(self, w):
+        """Visible fraction tau_i along ``w``, kept off zero for those who divide by it."""
+        return dr.maximum(visible_fraction(self.r, self.to_sphere(w)), TINY)
 
 
 class Lobe(NamedTuple):
@@ -66,7 +88,6 @@ class Micrograin(Declared):
     """
 
     citation = CITATION
-    table_betas: tuple[float, float] | None = None
 
     tau_0 = Texture("filling factor: share of the base that grains cover, seen from above", 0.3, high=1, steep=True)
     beta = Texture(
@@ -131,8 +152,7 @@ class Micrograin(Declared):
         for name in unused:
             setattr(self, name, None)
         self.lobes = self._lobes()
-        if self.scattering == "multiple":
-            self.constant = {"beta", "beta_x", "beta_y"}  # they make the table
+        self.losses = Made()
 
     def _lobes(self) -> list[Lobe]:
         front = mi.BSDFFlags.FrontSide | (0 if self.isotropic else mi.BSDFFlags.Anisotropic)
@@ -157,10 +177,9 @@ class Micrograin(Declared):
     def update(self) -> None:
         """Bring up to date what is made from the parameters."""
         if self.scattering == "multiple":
-            beta_x, beta_y = (self._constant(getattr(self, name)) for name in self.axes)
-            if (beta_x, beta_y) != self.table_betas:
-                shaded = Shadows.union if self.masking == "correlated" else Shadows.sum
-                self.table, self.table_betas = LossTable.made(beta_x, beta_y, self.diffuse, shaded), (beta_x, beta_y)
+            shaded = Shadows.union if self.masking == "correlated" else Shadows.sum
+            beta = [self._constant(getattr(self, name)) for name in dict.fromkeys(self.axes)]
+            self.losses.update(partial(LossTable.made, self.diffuse, shaded), *beta)
 
     def eval_pdf(self, ctx, si, wo, active):
         """(f |cos_o|, solid-angle density of `sample`): the sum of the lobes (Lucas 2024, Eq. 20)."""
@@ -225,7 +244,7 @@ class Micrograin(Declared):
         """The grains here, the chance of each enabled lobe of theirs, and that of the base (None if not wanted)."""
         tau_0 = self.number("tau_0", si, active)
         beta_x, beta_y = (self.number(name, si, active) for name in self.axes)
-        grains = Grains.of(tau_0, beta_x, beta_y)
+        grains = Grains(tau_0, density(tau_0), beta_x, beta_y)
         wi, above = grains.lift(si.wi), si.wi.z > 0
         shares = {
             n: dr.select(above, lobe.weigh(self, si, active, grains, wi), 0)
@@ -311,15 +330,22 @@ class Micrograin(Declared):
             return albedo * smith.grain_weight(
                 grains.r, grains.to_sphere(wi), grains.to_sphere(wo)
             ) * through * cosine, cosine
-        facet = Facet(self._share(si, active), coat)
-        first, second, pdf = lambertian(grains, wi, wo, self._shaded, facet, isotropic=self.isotropic)
+        first, second, pdf = lambertian(
+            *grains[1:],
+            wi,
+            wo,
+            self._shaded,
+            closed=self.isotropic and coat is None and self.variation != "normal",
+            share=self._share(si, active),
+            coat=coat,
+        )
         value = albedo * first
         if self.variation != "none":
             value = value + self.diffuse_reflectance_2.eval(si, active) * second
         return value, pdf / grains.visible(wi)
 
     def _weigh_multiple(self, si, active, grains, wi):
-        return sum(self.table.along(grains.tau_0, wi))
+        return sum(self.losses.result.along(grains.tau_0, grains.to_sphere(wi)))
 
     def _draw_multiple(self, si, active, grains, wi, u, sample2):
         return mi.warp.square_to_cosine_hemisphere(sample2)
@@ -328,11 +354,12 @@ class Micrograin(Declared):
         """Light that single scattering loses (`compensation`), by cosine."""
         # Few grains do not pass light to each other: what they return is proportional to their number.
         tau_0 = dr.maximum(grains.tau_0, SPARSEST)
-        lost_i, lost_o = (self.table.along(tau_0, w) for w in (wi, wo))
+        losses = self.losses.result
+        lost_i, lost_o = (losses.along(tau_0, grains.to_sphere(w)) for w in (wi, wo))
         base = mi.UnpolarizedSpectrum(0)
         if self.base is not None:
             base = clamp(self._base_albedo(si, active), 0, 1)
-        value = lobe(tau_0, self.table.at(tau_0), lost_i, lost_o, self._mean_albedo(si, active), base)
+        value = returned(tau_0, losses.at(tau_0), lost_i, lost_o, self._mean_albedo(si, active), base)
         return value * (wo.z * grains.tau_0 / tau_0), wo.z / dr.pi
 
     def _visible_normal(self, grains: Grains, wi, sample2):
@@ -359,8 +386,8 @@ class Micrograin(Declared):
         """The second colour's share at a point of the grain, or None."""
         if self.variation == "normal":
             sin, cos = dr.sincos(dr.deg2rad(self.number("variation_azimuth", si, active)))
-            return SecondColour(cos, sin)
-        return SecondColour() if self.variation == "height" else None
+            return Share(cos, sin)
+        return Share() if self.variation == "height" else None
 
     def _coat(self, si, active):
         """The grains' dielectric coat: from the local cosine to its reflectance."""
@@ -390,10 +417,10 @@ class Micrograin(Declared):
 
         return directional_albedo(reflected, upright, active, 16, copies=True)
 
-    def _constant(self, beta) -> float:
+    def _constant(self, beta: Any) -> Any:
         if varies(beta):
             raise ParameterError('beta: a texture, which scattering = "multiple" does not allow; tau_0 may be one.')
-        return float(np.asarray(beta.mean()).item())
+        return beta.mean()
 
     def _fresnel(self, si, active, cos, h, m):
         """Reflectance of the grain at height ``h`` with normal ``m``."""
