@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -13,10 +13,12 @@ import drjit as dr
 import mitsuba as mi
 
 from .errors import ParameterError, suggestion
+from .microfacet.fresnel import Metal, mirror
 from .microfacet.numerics import clamp, keep
-from .parameters import Colour, Parameter, Row, Spectrum
+from .parameters import Colour, Parameter, Row, Spectrum, Usual
 
-ETA, K, TINT = Spectrum("", low=1e-3, high=100.0), Spectrum("", high=100.0), Colour("")
+ETA = Spectrum("", low=1e-3, high=100.0, usually=Usual(0.1, 10, logarithmic=True))
+K, TINT = Spectrum("", high=100.0, usually=Usual(0.1, 10, logarithmic=True)), Colour("")
 PARTS = {"eta": ETA, "k": K, "reflectivity": TINT, "edge_tint": TINT}
 """What a metal is given by, and the allowed ranges."""
 
@@ -35,11 +37,13 @@ class Complex:
         """Whether this is Mitsuba's ``material: "none"``."""
         return self.eta is None and self.reflectivity is None
 
-    def eval(self, si: mi.SurfaceInteraction3f, active: Any) -> tuple[Any, Any]:
-        """(eta, k) at a surface point."""
+    def reflectance(self, si: Any, active: Any) -> Metal | Callable[[Any], Any]:
+        """Fresnel's reflectance at a surface point, a function of the cosine of incidence; 1 of a mirror."""
+        if self.mirror:
+            return mirror
         if self.eta is not None:
-            return ETA.clamp(self.eta.eval(si, active)), K.clamp(self.k.eval(si, active))
-        return artist_friendly(self.reflectivity.eval(si, active), self.edge_tint.eval(si, active))
+            return Metal(ETA.at(self.eta, si, active), K.at(self.k, si, active))
+        return Metal(*artist_friendly(self.reflectivity.eval(si, active), self.edge_tint.eval(si, active)))
 
 
 def artist_friendly(reflectivity: Any, edge_tint: Any) -> tuple[Any, Any]:
@@ -100,6 +104,10 @@ class Conductor(Parameter):
         found = _objects(mi.load_dict({"type": "conductor", "material": material}))
         return Complex(found["eta"], found["k"])
 
+    def at(self, value: Any, si: Any, active: Any) -> Any:
+        """Reflectance, a function of the cosine of incidence; None if there is no metal."""
+        return None if value is None else value.reflectance(si, active)
+
     def children(self, value: Any) -> Mapping[str, Any]:
         """The textures of the chosen way."""
         parts = {} if value is None else vars(value)
@@ -115,12 +123,16 @@ class Conductor(Parameter):
         ends = {name: (part.low, part.high) for name, part in PARTS.items()} | {"k": (-math.inf, K.high)}
         return {name + self.suffix: both for name, both in ends.items()}
 
+    def usual(self) -> Mapping[str, Usual]:
+        """Of all four parts."""
+        return {name + self.suffix: part.named(name).usual()[name] for name, part in PARTS.items()}
+
     def rows(self) -> Iterable[Row]:
         """A line for each name."""
         material, eta, k, reflectivity, edge_tint = self.names()
         default = "-" if self.default is None else self.default
         yield Row(
-            material, "name", default, 'Mitsuba\'s, or "none"', "", f"{self.meaning}: by name; 'none' is a mirror"
+            material, "name", default, 'Mitsuba\'s, or "none"', "", "", f"{self.meaning}: by name; 'none' is a mirror"
         )
         for name, part, default, meaning in (
             (eta, ETA, "-", f"{self.meaning}: real part of the index, with {k}"),
@@ -128,7 +140,7 @@ class Conductor(Parameter):
             (reflectivity, TINT, "-", f"{self.meaning}: by colour at normal incidence"),
             (edge_tint, TINT, "0", f"colour bias at grazing, with {reflectivity}"),
         ):
-            yield Row(name, part.kind, default, part.allowed(), "", meaning)
+            yield Row(name, part.kind, default, part.allowed(), str(self.usual()[name]), "", meaning)
 
 
 @cache

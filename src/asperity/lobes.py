@@ -15,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 
 from .microfacet.numerics import ONE_BELOW, TINY
+from .microfacet.sampling import cosine_hemisphere
 from .parameters import Declared
 
 ALL_COMPONENTS = 0xFFFFFFFF
@@ -58,6 +59,25 @@ class Opening(Protocol):
 
     def reach(self, wi: Any, wo: Any) -> Any:
         """Share of the base that both directions reach."""
+
+
+@dataclass
+class ByCosine:
+    """A lobe that is drawn by cosine, and stands alone."""
+
+    brdf: Callable[[Any, Any], Any]  # (wi, wo) -> f per steradian
+
+    def share(self, wi: Any) -> Any:
+        """All."""
+        return 1
+
+    def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
+        """(f cos_o, cos_o / pi)."""
+        return self.brdf(wi, wo) * wo.z, wo.z / dr.pi
+
+    def draw(self, wi: Any, u: Any, v: Any) -> Any:
+        """By cosine."""
+        return cosine_hemisphere(v.x, v.y)
 
 
 @dataclass
@@ -130,7 +150,7 @@ class LobeModel(Declared):
         bs.eta = 1
         for n, chance in chances.items():
             chosen = sample1 >= start
-            wo = lobes[n].draw(wi, _rescale(sample1, start, chance), sample2)
+            wo = mi.Vector3f(lobes[n].draw(wi, _rescale(sample1, start, chance), sample2))
             bs.wo = dr.select(chosen, wo, bs.wo)
             bs.sampled_component = dr.select(chosen, mi.UInt32(n), bs.sampled_component)
             bs.sampled_type = dr.select(chosen, mi.UInt32(self.flags()[n]), bs.sampled_type)

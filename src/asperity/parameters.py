@@ -144,10 +144,6 @@ class Texture(Parameter):
 
     def parse(self, props: mi.Properties) -> Any:
         """A ``mi.Texture``, or None if none is given and there is no default."""
-        return self.texture_or_default(props)
-
-    def texture_or_default(self, props: mi.Properties) -> Any:
-        """The texture that the scene gives, or that of the default number, if there is one."""
         if self.name in props:
             return self.texture(props, self.name)
         return None if self.default is None else props.get_unbounded_texture(self.name, self.default)
@@ -250,12 +246,16 @@ class Axes(Texture):
         """NAME, and NAME with either suffix."""
         return self.name, *(self.name + suffix for suffix in self.suffixes)
 
+    def one(self, name: str) -> Texture:
+        """The parameter of one of these names."""
+        return Texture(self.meaning, self.default, self.low, self.high, self.unit).named(name)
+
     def parse(self, props: mi.Properties) -> Along:
         """The value by the names that the scene gives, or by NAME."""
         name, *axes = self.names()
         conflict({name} & set(props.keys()), set(axes) & set(props.keys()))
         given = [axis if axis in props else name for axis in axes]
-        return Along({name: self.named(name).texture_or_default(props) for name in dict.fromkeys(given)})
+        return Along({name: self.one(name).parse(props) for name in dict.fromkeys(given)})
 
     def at(self, value: Along, si: Any, active: Any) -> tuple[Any, Any]:
         """The numbers along x and along y."""
@@ -269,7 +269,7 @@ class Axes(Texture):
     def check(self, value: Any) -> None:
         """Check what is there."""
         for name, texture in self.children(value).items():
-            Texture.check(self.named(name), texture)
+            self.one(name).check(texture)
 
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """The same for all names."""
@@ -316,6 +316,7 @@ class Ior(Texture):
 
     low: float = 0.5
     high: float = 5.0
+    usually: Usual | None = field(default_factory=lambda: Usual(1, 2))
     kind: ClassVar[str] = "name, number or texture"
 
     def parse(self, props: mi.Properties) -> Any:

@@ -40,7 +40,7 @@ def show(
     if as_json:
         raise ParameterError(f'--json: {name} is no preset. For `--material`, write {{"type": "{name}", ...}}.')
     out.print(f"{name}: {registry.about(found)}\n")
-    table = Table("parameter", "kind", "default", "allowed", "unit", "meaning")
+    table = Table("parameter", "kind", "default", "allowed", "usual", "unit", "meaning")
     for row in found.rows():
         table.add_row(*row)
     table.columns[0].no_wrap = True

@@ -8,7 +8,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from .numerics import clamp
 from .quadrature import accumulate
+
+FEW = 16
+"""Samples of `upright_albedo`."""
 
 
 def directional_albedo(
@@ -35,3 +39,18 @@ def directional_albedo(
     captured = (si, active) if symbolic else ()
     (total,) = accumulate(weight, mi.UInt32(samples), (mi.UnpolarizedSpectrum(0),), captured)
     return total / samples
+
+
+def upright_albedo(bsdf: Any, si: Any, active: Any) -> Any:
+    """Albedo of a BSDF at normal incidence, in [0, 1]: where Mitsuba's is right, that."""
+    upright = mi.SurfaceInteraction3f(si)
+    upright.wi = mi.Vector3f(0, 0, 1)
+    beyond_diffuse = int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Transmission)
+    if not bsdf.flags() & beyond_diffuse:
+        return clamp(mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(upright, active)), 0, 1)
+
+    def reflected(ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> tuple[Any, Any]:
+        bs, weight = bsdf.sample(ctx, si, sample1, sample2, active)
+        return bs, mi.unpolarized_spectrum(weight) & (bs.wo.z > 0)
+
+    return clamp(directional_albedo(reflected, upright, active, FEW, copies=True), 0, 1)

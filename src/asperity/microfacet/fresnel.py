@@ -23,6 +23,27 @@ class Dielectric:
         return mi.fresnel(cos, self.eta)[0]
 
 
+@dataclass
+class Metal:
+    """A smooth interface to a conductor of index ``eta`` + i ``k``, by wavelength."""
+
+    eta: Any
+    k: Any
+
+    def __call__(self, cos: Any) -> Any:
+        """Unpolarised reflectance at the cosine of incidence."""
+        return conductor(cos, self.eta, self.k)
+
+    def mixed(self, other: Metal, share: Any) -> Metal:
+        """This metal, and ``other`` instead in a ``share`` of its index."""
+        return Metal(dr.lerp(self.eta, other.eta, share), dr.lerp(self.k, other.k, share))
+
+
+def mirror(cos: Any) -> Any:
+    """Reflectance of what reflects everything."""
+    return 1.0
+
+
 def conductor(cos: Any, eta: Any, k: Any) -> Any:
     """Unpolarised reflectance of a conductor of index ``eta`` + i ``k`` for the cosine of incidence: in [0, 1].
 

@@ -36,6 +36,11 @@ def cosine_hemisphere(u: Any, v: Any) -> Any:
     return direction(radius * cos, radius * sin, dr.safe_sqrt(1 - u))
 
 
+def reflect(w: Any, m: Any) -> Any:
+    """``w`` mirrored in the unit normal ``m``."""
+    return 2 * dr.dot(w, m) * m - w
+
+
 def about(n: Any, w: Any) -> Any:
     """``w``, turned from about the z axis to about the unit vector ``n``, n.z >= 0 (Duff et al. 2017)."""
     a = -dr.rcp(1 + n.z)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 
 from ...microfacet.numerics import one_minus_exp
-from ..micrograin import Micrograin
 from ..micrograin.grains import density
-from .mixture import Mixture
+from .mixture import Layer, Mixture, Share
 
 CITATION = """\
 @inproceedings{DEon2023NonUniform,
@@ -29,16 +30,17 @@ class DEon(Mixture):
 
     citation = CITATION
 
-    tau_0, beta, beta_x, beta_y = Micrograin.tau_0, Micrograin.beta, Micrograin.beta_x, Micrograin.beta_y
-    metal, base = Micrograin.metal, Micrograin.base
-
-    def shares(self, si, active, layer, i, o):
+    def shares(self, si: Any, active: Any, layer: Layer) -> tuple[Share, Share]:
         """See `grain_share` and `base_share`."""
-        depth, slopes = dr.pi * density(layer.tau_0), layer.smith_lambda(i) + layer.smith_lambda(o)
-        return grain_share(depth, slopes), base_share(depth, slopes)
+        depth = dr.pi * density(layer.tau_0)
+
+        def slopes(i: Any, o: Any) -> Any:
+            return layer.smith_lambda(i) + layer.smith_lambda(o)
+
+        return lambda i, o: grain_share(depth, slopes(i, o)), lambda i, o: base_share(depth, slopes(i, o))
 
 
-def grain_share(depth, slopes):
+def grain_share(depth: Any, slopes: Any) -> Any:
     """Part of the grains' heights that both directions reach, int_w^1 u^(Lambda_i + Lambda_o) du, in [0, tau_0].
 
     w = 1 - tau_0 = exp(-depth), ``slopes`` = Lambda_i + Lambda_o >= 0. At the height of quantile u, Smith's masking is
@@ -47,7 +49,7 @@ def grain_share(depth, slopes):
     return one_minus_exp(depth * (1 + slopes)) / (1 + slopes)
 
 
-def base_share(depth, slopes):
+def base_share(depth: Any, slopes: Any) -> Any:
     """Part of the base that both directions reach, int_0^w w^(Lambda_i + Lambda_o) du, in [0, 1 - tau_0].
 
     Being flat, the base masks nothing itself. Reconstructed: not verified against the publication's text.

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
-from ...microfacet.numerics import keep
-from ...parameters import BSDF, Texture
-from ..micrograin import Micrograin
-from ..micrograin.model import ONE_BELOW
-from .mixture import Mixture
+from ...microfacet.masking import smith_height_correlated
+from ...microfacet.numerics import ONE_BELOW, keep
+from ...parameters import BSDF, Texture, Usual
+from .mixture import Layer, Mixture, Share
 
 CITATION = """\
 @article{Merillou2000Porosity,
@@ -38,21 +39,24 @@ class Merillou(Mixture):
 
     citation = CITATION
 
-    tau_0, beta, beta_x, beta_y = Micrograin.tau_0, Micrograin.beta, Micrograin.beta_x, Micrograin.beta_y
-    depth = Texture("depth of the pores over their radius", 1.0, high=1000)
-    metal, base = Micrograin.metal, BSDF("what lies at the bottom of the pores; black if none")
+    depth = Texture("depth of the pores over their radius", 1.0, high=1000, usually=Usual(0.1, 10, logarithmic=True))
+    base = BSDF("what lies at the bottom of the pores; black if none")
 
-    def shares(self, si, active, layer, i, o):
+    def shares(self, si: Any, active: Any, layer: Layer) -> tuple[Share, Share]:
         """See `lit_and_visible`; the metal's share is tau_0 / (1 + Lambda_i + Lambda_o)."""
-        depth = keep(self.number("depth", si, active), SHALLOW, dr.inf)
-        metal = layer.tau_0 / (1 + layer.smith_lambda(i) + layer.smith_lambda(o))
-        if self.base is None:
-            return metal, 0
-        shift_i, shift_o = (mi.Vector2f(w.x, w.y) * (depth / w.z) for w in (i, o))
-        return metal, (1 - layer.tau_0) * lit_and_visible(shift_i, shift_o)
+        depth = keep(self.at("depth", si, active), SHALLOW, dr.inf)
+
+        def metal(i: Any, o: Any) -> Any:
+            return layer.tau_0 * smith_height_correlated(layer.smith_lambda(i), layer.smith_lambda(o))
+
+        def bottom(i: Any, o: Any) -> Any:
+            shift_i, shift_o = (mi.Vector2f(w.x, w.y) * (depth / w.z) for w in (i, o))
+            return (1 - layer.tau_0) * lit_and_visible(shift_i, shift_o)
+
+        return metal, bottom
 
 
-def lit_and_visible(a, b):
+def lit_and_visible(a: Any, b: Any) -> Any:
     """Part in [0, 1] of a pore's bottom that is both lit and visible: what three unit discs have in common, over pi.
 
     They are the bottom itself, about the origin, and the opening's outlines, cast on the bottom along the directions i
@@ -63,7 +67,7 @@ def lit_and_visible(a, b):
     return dr.maximum(arcs / (2 * dr.pi), 0)
 
 
-def _apart(x):
+def _apart(x: Any) -> Any:
     """``x``, or a short vector if that has no direction: any will do for two discs that coincide.
 
     But for two that nearly do, only their own: the three directions make a triangle.
@@ -71,7 +75,7 @@ def _apart(x):
     return dr.select(dr.squared_norm(x) < 1e-30, type(x)(1e-6, 0), x)
 
 
-def _arc(centre, first, second):
+def _arc(centre: Any, first: Any, second: Any) -> Any:
     """int x dy - y dx along the arc of the unit circle about ``centre`` that lies in two more unit discs.
 
     Their centres are ``first`` and ``second`` away, and each cuts out an arc of half-width acos(distance / 2).

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import drjit as dr
-import mitsuba as mi
 
-from ...microfacet.numerics import clamp
-from ...parameters import Choice, Colour, Declared, Texture
+from ...lobes import ByCosine, Lobe, LobeModel, diffuse
+from ...microfacet.numerics import TINY, clamp
+from ...parameters import Choice, Colour, Texture, Usual
 
 CITATION = """\
 @inproceedings{Oren1994Lambert,
@@ -19,10 +19,9 @@ CITATION = """\
   year      = {1994},
   doi       = {10.1145/192161.192213}
 }"""
-TINY = 1e-20
 
 
-class OrenNayar(Declared):
+class OrenNayar(LobeModel):
     """Oren and Nayar 1994: Lambertian V-grooves whose facets' tilts are distributed normally.
 
     ``full`` fits the integrals of single scattering, and light that bounces twice in a groove; ``qualitative`` is the
@@ -32,31 +31,22 @@ class OrenNayar(Declared):
     citation = CITATION
 
     reflectance = Colour("albedo of the facets", 0.5)
-    sigma = Texture("standard deviation of the facets' tilt", 20.0, high=90, unit="degree")
+    sigma = Texture("standard deviation of the facets' tilt", 20.0, high=90, unit="degree", usually=Usual(0, 45))
     variant = Choice("the model, or its simpler fit", options=("full", "qualitative"))
 
-    def components(self) -> list[int]:
+    def flags(self) -> list[int]:
         """One diffuse lobe."""
-        return [int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide)]
+        return [diffuse()]
 
-    def eval_pdf(self, ctx, si, wo, active):
-        """(f cos_o, cos_o / pi)."""
-        active = active & (si.wi.z > 0) & (wo.z > 0) & ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 0)
-        sigma, albedo = dr.deg2rad(self.number("sigma", si, active)), self.reflectance.eval(si, active)
-        f = (full if self.variant == "full" else qualitative)(Angles.of(si.wi, wo), sigma * sigma, albedo)
-        return dr.select(active, f * wo.z, 0), dr.select(active, wo.z / dr.pi, 0)
-
-    def sample(self, ctx, si, sample1, sample2, active):
-        """By cosine."""
-        bs = dr.zeros(mi.BSDFSample3f)
-        bs.wo = mi.warp.square_to_cosine_hemisphere(sample2)
-        bs.eta, bs.sampled_type = 1, mi.UInt32(self.components()[0])
-        value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
-        return bs, value / dr.maximum(bs.pdf, TINY) & (bs.pdf > 0)
+    def lobes(self, si: Any, active: Any) -> list[Lobe]:
+        """The model, drawn by cosine."""
+        brdf, tilt = {"full": full, "qualitative": qualitative}[self.variant], dr.deg2rad(self.at("sigma", si, active))
+        albedo = self.at("reflectance", si, active)
+        return [ByCosine(lambda wi, wo: brdf(Angles.of(wi, wo), dr.square(tilt), albedo))]
 
 
 class Angles(NamedTuple):
-    """Two directions: alpha is the larger angle with the normal, beta the smaller one."""
+    """Two directions above the surface: alpha is the larger angle with the normal, beta the smaller one."""
 
     cos_alpha: Any
     cos_beta: Any
@@ -65,27 +55,22 @@ class Angles(NamedTuple):
     q: Any  # sin(alpha) sin(beta) cos(phi)
 
     @classmethod
-    def of(cls, wi, wo) -> Angles:
-        """The angles of two vectors; those below the horizon are meaningless, and masked by the caller."""
-        sin_i, sin_o = (dr.sqrt(dr.maximum(dr.square(w.x) + dr.square(w.y), TINY)) for w in (wi, wo))
-        cos_i, cos_o = (dr.clip(w.z, 1e-4, 1) for w in (wi, wo))
+    def of(cls, wi: Any, wo: Any) -> Angles:
+        """The angles of two unit vectors."""
+        sin_i, sin_o = (dr.sqrt(dr.square(w.x) + dr.square(w.y) + TINY) for w in (wi, wo))
+        cos_i, cos_o = (dr.maximum(w.z, 1e-4) for w in (wi, wo))
         steep = cos_i < cos_o
-        return cls(
-            dr.minimum(cos_i, cos_o),
-            dr.maximum(cos_i, cos_o),
-            dr.select(steep, sin_i, sin_o),
-            dr.select(steep, sin_o, sin_i),
-            wi.x * wo.x + wi.y * wo.y,
-        )
+        cosines, sines = (cos_i, cos_o), (dr.select(steep, sin_i, sin_o), dr.select(steep, sin_o, sin_i))
+        return cls(dr.minimum(*cosines), dr.maximum(*cosines), *sines, wi.x * wo.x + wi.y * wo.y)
 
 
-def qualitative(angles: Angles, variance, albedo):
+def qualitative(angles: Angles, variance: Any, albedo: Any) -> Any:
     """f_r per steradian (Oren and Nayar 1994, the qualitative model), for the variance of the tilt in radians."""
     a, b = 1 - 0.5 * variance / (variance + 0.33), 0.45 * variance / (variance + 0.09)
     return albedo / dr.pi * (a + b * dr.maximum(angles.q, 0) / angles.cos_beta)
 
 
-def full(angles: Angles, variance, albedo):
+def full(angles: Angles, variance: Any, albedo: Any) -> Any:
     """f_r per steradian (Oren and Nayar 1994, the functional approximation), for the variance of the tilt in radians.
 
     sin(alpha) cos(phi) tan(beta) = q / cos(beta), and tan((alpha + beta) / 2) is the sines' sum over the cosines'.

@@ -29,7 +29,7 @@ P_B = a_B / (1 - tau_0). With any number of vertices in between, K becomes K + K
     S_SS = (K_SS + K_SB^2 P_B) / (l_S^2 D),    S_SB = 1 / (l_S D),    S_BB = P_S / D,
     D = det(1 - P K) = 1 - K_SS P_S - K_SB^2 P_S P_B.
 
-The furnace. Were losses diffuse, their means m_X would be T l_S / H and (1 - T) l_B / (1 - tau_0), and all that was lost
+The furnace. Were losses diffuse, their means m_X would be T l_S / H and (1 - T) l_B / (1 - tau_0), and what was lost
 would come back in the white furnace. They are not, so L_X is scaled by d_X, such that it does for any i:
 
     f = 1 / pi sum_XY (a_X d_X L_X(i)) S_XY (a_Y d_Y L_Y(o)),    d_X sum_Y S_XY d_Y m_Y = 1  with S of a_S = a_B = 1.
@@ -51,8 +51,9 @@ import numpy as np
 from ...microfacet.ggx import GRAZING, lift, normal_in_sphere_space, to_sphere
 from ...microfacet.numerics import ONE_BELOW
 from ...microfacet.quadrature import accumulate
+from ...microfacet.sampling import about, cosine_hemisphere, reflect
 from ...microfacet.tables import Table, array_types
-from .grains import density, sample_visible_normal, visible_fraction
+from .grains import Grains, density, sample_visible_normal, visible_fraction
 from .shadows import Shadows, shadow
 
 FILLINGS, COSINES, AZIMUTHS = 25, 48, 7
@@ -136,6 +137,32 @@ def returned(tau_0: Any, loss: Loss, lost_i: Any, lost_o: Any, grain: Any, base:
 
 
 @dataclass
+class Returned:
+    """The lobe of light that single scattering loses, drawn by cosine."""
+
+    grains: Grains
+    losses: LossTable
+    grain: Any  # albedos, spectra
+    base: Any
+
+    def share(self, wi: Any) -> Any:
+        """What is lost."""
+        return sum(self.losses.along(self.grains.tau_0, self.grains.to_sphere(wi)))
+
+    def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
+        """`returned` times the cosine, and the cosine over pi."""
+        # Few grains do not pass light to each other: what they return is proportional to their number.
+        tau_0 = dr.maximum(self.grains.tau_0, SPARSEST)
+        lost_i, lost_o = (self.losses.along(tau_0, self.grains.to_sphere(w)) for w in (wi, wo))
+        f = returned(tau_0, self.losses.at(tau_0), lost_i, lost_o, self.grain, self.base)
+        return f * (wo.z * self.grains.tau_0 / tau_0), wo.z / dr.pi
+
+    def draw(self, wi: Any, u: Any, v: Any) -> Any:
+        """By cosine."""
+        return cosine_hemisphere(v.x, v.y)
+
+
+@dataclass
 class Nodes:
     """Nodes of the losses: each filling factor with each direction of the first quadrant, in sphere space."""
 
@@ -178,7 +205,7 @@ class Nodes:
         def blocked(index: Any, beta: tuple) -> tuple[Any, Any]:
             """Of light that has met a grain, or the base, the share that is in shadow then."""
             u, v, *more = (dr.gather(Float, point, first + index) for point in points)
-            cosine = _cosine_hemisphere(Vector, *more)
+            cosine = Vector(cosine_hemisphere(*more))
             wo, h, weight = scatter(r, i, sample_visible_normal(r, i, u, v), cosine, *beta)
             free = [exposed(wo, h, beta), exposed(cosine, Float(0), beta)]
             return 1 - weight * free[0], 1 - free[1]
@@ -195,7 +222,7 @@ class Nodes:
         return [visible * grain, (1 - visible) * base, visible]
 
     def means(self, table: Table) -> list[Any]:
-        """Hemispherical means of a ``table`` on these nodes: 2 int int L cos dcos dazimuth / (2 pi), real directions."""
+        """Hemispherical means of a ``table`` on these nodes: 2 int int L cos dcos dazimuth / (2 pi)."""
         Float = type(self.r)
         UInt = dr.uint32_array_t(Float)
         squares, turns = 512, 128
@@ -219,7 +246,9 @@ class Nodes:
         """H = tau_0 int D dm = r int int exp(-r pi (1 - h^2)) |E m'| dh dphi, for each filling factor."""
         Float, n = type(self.r), 64
         middles = (np.arange(n) + 0.5) / n
-        tau_0, h, turn = (x.ravel() for x in np.meshgrid(self.tau_0.numpy().astype(float), middles, middles, indexing="ij"))
+        tau_0, h, turn = (
+            x.ravel() for x in np.meshgrid(self.tau_0.numpy().astype(float), middles, middles, indexing="ij")
+        )
         r, sin, turn = -np.log1p(-np.minimum(tau_0, 1 - 1e-6)) / np.pi, np.sqrt(1 - h * h), 2 * np.pi * turn
         numbers = r * np.exp(-r * np.pi * (1 - h * h)), sin * np.cos(turn), sin * np.sin(turn), h
         exposed, x, y, h = (Float(x.astype(np.float32)) for x in numbers)
@@ -234,7 +263,7 @@ def _scattered(r: Any, i: Any, point: Any, cosine: Any, beta_x: Any, beta_y: Any
     cross the horizon, where all light is lost at once.
     """
     m = dr.normalize(type(i)(beta_x * point.x, beta_y * point.y, point.z))
-    wo = _about(m, cosine)
+    wo = about(m, cosine)
     if not dr.grad_enabled(wo):
         return wo, point.z, 1
     wo = dr.detach(wo)
@@ -246,7 +275,7 @@ def _reflected(r: Any, i: Any, point: Any, cosine: Any, beta_x: Any, beta_y: Any
     """The same of light from a mirror's ``point``: at a fixed wo, its height changes (density: Lucas 2024, Eq. 22)."""
     m = dr.normalize(type(i)(beta_x * point.x, beta_y * point.y, point.z))
     wi = dr.normalize(type(i)(i.x / beta_x, i.y / beta_y, i.z))
-    wo = 2 * dr.dot(wi, m) * m - wi
+    wo = reflect(wi, m)
     if not dr.grad_enabled(wo):
         return wo, point.z, 1
     wo = dr.detach(wo)
@@ -258,16 +287,3 @@ def _reflected(r: Any, i: Any, point: Any, cosine: Any, beta_x: Any, beta_y: Any
 def _filling(tau_0: Any) -> Any:
     """The tables' coordinate in [0, 1]."""
     return dr.atan2(dr.sqrt(dr.maximum(tau_0, 1e-6)), dr.sqrt(dr.maximum(1 - tau_0, 1e-6))) * (2 / dr.pi)
-
-
-def _cosine_hemisphere(Vector: Any, u: Any, v: Any) -> Any:
-    radius, (sin, cos) = dr.sqrt(u), dr.sincos(2 * dr.pi * v)
-    return Vector(radius * cos, radius * sin, dr.safe_sqrt(1 - u))
-
-
-def _about(n: Any, w: Any) -> Any:
-    """Turn ``w`` from about the z axis to about ``n`` (Duff et al. 2017), n.z >= 0."""
-    a = -dr.rcp(1 + n.z)
-    b = n.x * n.y * a
-    s, t = type(n)(1 + n.x * n.x * a, b, -n.x), type(n)(b, 1 + n.y * n.y * a, -n.y)
-    return s * w.x + t * w.y + n * w.z

@@ -19,7 +19,9 @@ import drjit as dr
 
 from ...microfacet.numerics import heading
 from ...microfacet.quadrature import gauss_legendre, integrate
-from .grains import Grains, SecondColour, exposure
+from ...microfacet.sampling import about, cosine_hemisphere, split
+from .grains import Grains, exposure
+from .material import Facet, Material
 from .shadows import Shadows, shadow
 
 HEIGHTS, AZIMUTHS = 16, (16, 8)
@@ -28,19 +30,6 @@ HEIGHTS, AZIMUTHS = 16, (16, 8)
 Against many nodes, over random parameters and directions (cosines >= 0.03, a third near retro-reflection), the relative
 error is 0.02 % in the mean, under 0.5 % in 99.8 % of all and wherever the value exceeds 0.05; the worst are 0.9 %, in
 back-lit directions of value 0.001. Half the nodes have ten times the error."""
-
-
-@dataclass
-class Facet:
-    """What a grain's facets are, beside Lambertian of albedo 1: dataclasses, since they pass through recorded loops."""
-
-    second: SecondColour | None = None  # where there is a second albedo
-    coat: Callable[[Any], Any] | None = None  # reflectance of a dielectric coat, of the local cosine
-
-    @property
-    def alike_around(self) -> bool:
-        """Whether facets at one height are the same."""
-        return self.coat is None and (self.second is None or self.second.by_height)
 
 
 class Integral(NamedTuple):
@@ -83,6 +72,33 @@ def lambertian(
     first, second, pdf = integrate(at_height, HEIGHTS, (grains, pair, facet), grains.r * wi.z)
     scale = grains.r * stretch_o / (dr.pi * i.z)
     return Integral(scale * first, scale * second, scale * pdf)
+
+
+@dataclass
+class Lambertian:
+    """The lobe of diffuse grains, bare or under a coat (Lucas 2024, Eq. 21)."""
+
+    grains: Grains
+    material: Material
+    shaded: Callable[[Shadows, Any], Any]
+    isotropic: bool
+
+    def share(self, wi: Any) -> Any:
+        """What is seen of grains, but for what is left to their specular lobe."""
+        return self.grains.visible(wi) * self.material.diffuse_part(wi.z)
+
+    def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
+        """tau_0 f_d cos_o, and the density of cosine lobes about visible normals."""
+        material = self.material
+        first, second, pdf = lambertian(self.grains, wi, wo, self.shaded, material.facet, isotropic=self.isotropic)
+        value = material.albedo * first
+        if material.albedo_2 is not None:
+            value = value + material.albedo_2 * second
+        return value, pdf / self.grains.visible(wi)
+
+    def draw(self, wi: Any, u: Any, v: Any) -> Any:
+        """A cosine lobe about a visible normal: four numbers, of the three that Mitsuba hands out."""
+        return about(self.grains.visible_normal(wi, v.x, v.y), cosine_hemisphere(*split(u)))
 
 
 @dataclass

@@ -39,6 +39,11 @@ class Grains:
         """A direction kept off the horizon; those from below are meaningless then, and masked by the caller."""
         return lift(w, self.beta_x, self.beta_y)
 
+    def visible_normal(self, w: Any, u: Any, v: Any) -> Any:
+        """A unit normal of what is visible along ``w``, for ``u``, ``v`` in [0, 1): see `sample_visible_normal`."""
+        m = sample_visible_normal(self.r, self.to_sphere(w), u, v)
+        return dr.normalize(type(w)(self.beta_x * m.x, self.beta_y * m.y, m.z))
+
     def visible(self, w: Any) -> Any:
         """Visible fraction tau_i along ``w``, kept off zero for those who divide by it."""
         return dr.maximum(visible_fraction(self.r, self.to_sphere(w)), TINY)
