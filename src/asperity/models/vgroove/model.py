@@ -18,7 +18,7 @@ from ...microfacet.numerics import clamp
 from ...microfacet.sampling import more_numbers
 from ...parameters import Choice, Declared, Flag, Integer, Texture, conflict, numbers, varies
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
-from .fresnel import Metal, fit
+from .fresnel import Reflectance, fit
 from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric_bounces
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
@@ -184,7 +184,7 @@ class VGroove(Declared):
             np.clip(alphas.max(), SMOOTHEST, min(type(self).alpha.high, DISTRIBUTIONS[self.distribution].largest))
         )
 
-    def _metal(self, si, active) -> Metal | None:
+    def _metal(self, si, active) -> Reflectance | None:
         if self.metal.mirror:
             return None
         eta, k = self.metal.eval(si, active)
@@ -192,7 +192,7 @@ class VGroove(Declared):
         def once(cos):
             return conductor(cos, eta, k)
 
-        return Metal(once, fit(once) if self.logarithm is None else self.logarithm)
+        return Reflectance(once, fit(once) if self.logarithm is None else self.logarithm)
 
     def _constant_logarithm(self) -> list | None:
         """ln F's fit if it is the same everywhere, for good: else it takes 7 Fresnel terms a call."""
