@@ -106,7 +106,7 @@ def test_constant_reflectance_multiplies_by_bounces(rgb, monkeypatch, symmetric)
     # A constant is no polynomial without a constant term, as reflectances are, which are 1 at grazing angles.
     for module in ("symmetric", "nonsymmetric"):
         monkeypatch.setattr(
-            f"asperity.models.vgroove.{module}.product", lambda e, k, *_: mi.Color3f(rho ** mi.Float(k))
+            f"asperity.models.vgroove.{module}.product", lambda e, fan: mi.Color3f(rho ** mi.Float(fan.k))
         )
     given = {"alpha": 0.7, "symmetric": symmetric}
     mean, _, largest = albedo(20, material="Au", max_bounces=most, **given)

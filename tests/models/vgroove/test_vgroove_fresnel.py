@@ -29,7 +29,7 @@ def test_closed_fresnel_product(rgb, material, accuracy):
             angle = phi + (2 * j - count - 1) * b
             exact = exact * np.asarray(conductor(mi.Float(0.9 * np.maximum(np.sin(angle), 0)), eta, k))
         u, w, b = (fresnel.multiples(*dr.sincos(mi.Float(x))) for x in (phi - np.pi / 2, np.pi / 2 - count * b, b))
-        bends = [c * d if m % 2 else -c * z for m, ((_, c), (z, d)) in enumerate(zip(u, w), 1)]
-        e = fresnel.waves(logarithm, mi.Float(0.9))
-        closed = fresnel.product(e, mi.UInt32(count), mi.Bool(count % 2 == 1), bends, [c for _, c in u], b)
+        cos_u = [cos for _, cos in u]
+        fan = fresnel.Fan(mi.UInt32(count), mi.Bool(count % 2 == 1), fresnel.numerators(u, w), cos_u, b)
+        closed = fresnel.product(fresnel.waves(logarithm, mi.Float(0.9)), fan)
         assert np.abs(np.asarray(closed) - exact).max() < count * fit_error + 1e-3

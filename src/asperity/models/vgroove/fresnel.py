@@ -1,11 +1,14 @@
 """The product of a metal's reflectances over all bounces in a groove, in closed form.
 
-Not in the paper, which multiplies them one by one. With ln F(c) = sum_n a_n c^n, the product over equally spaced angles
-is the exponential of sums of powers of their sines, and those are closed:
+Not in the paper, which multiplies them one by one. At the j-th of k bounces the cosine of incidence is l sin theta_j,
+with equally spaced angles theta_j = phi + (2 j - k - 1) b. Where ln F(c) = sum_n a_n c^n, the logarithm of the product
+is made of sums over j of powers of sin theta_j; these are sums of sin(n theta_j) and cos(n theta_j), which are closed:
 
-    sum_j e^(i n theta_j) = e^(i n phi) sin(n k b) / sin(n b),   theta_j = phi + (2 j - k - 1) b,   j = 1..k.
+    sum_j e^(i n theta_j) = e^(i n phi) sin(n k b) / sin(n b).
 
-Written with u = phi - pi/2 and w = pi/2 - k b, the angles that the kaleidoscope gives.
+The kaleidoscope gives u = phi - pi/2 and w = pi/2 - k b instead of phi and k b. With them the numerators are
+
+    sin(n phi) sin(n k b) = cos(n u) cos(n w) for odd n,   cos(n phi) sin(n k b) = -cos(n u) sin(n w) for even n.
 """
 
 from __future__ import annotations
@@ -21,10 +24,12 @@ NODES = (np.cos(np.pi * (np.arange(DEGREE + 1) + 0.25) / (DEGREE + 1.5)) + 1) / 
 FIT = np.linalg.pinv(NODES[:, None] ** np.arange(1, DEGREE + 1)).tolist()
 """From ln F at the nodes to a_1..a_6; F(0) = 1, so a_0 = 0. The worst error of all c: .06 % of gold's F, .1 % of
 copper's, 1 % of aluminium's and chromium's, whose F turns sharply near grazing angles."""
+TURNED = (1, -1, -1, 1, 1, -1)
+"""sin(n phi) of odd n, cos(n phi) of even n, over cos(n u), for n = 1..6."""
 
 
-class Metal(NamedTuple):
-    """Reflectances at a surface point."""
+class Reflectance(NamedTuple):
+    """Reflectances of the facets at a surface point."""
 
     once: Callable  # cosine -> spectrum
     logarithm: Any  # a_1..a_6, spectra
@@ -36,7 +41,7 @@ def fit(once: Callable) -> list:
     return [sum(weight * log for weight, log in zip(row, logs)) for row in FIT]
 
 
-def waves(logarithm, length) -> list:
+def waves(logarithm: Any, length: Any) -> list:
     """Coefficients in ln F(length sin theta) = e_0 + e_1 sin theta + e_2 cos 2 theta + e_3 sin 3 theta + ..."""
     a1, a2, a3, a4, a5, a6 = (a * length**n for n, a in enumerate(logarithm, 1))
     return [
@@ -50,7 +55,7 @@ def waves(logarithm, length) -> list:
     ]
 
 
-def multiples(sin, cos) -> list[tuple]:
+def multiples(sin: Any, cos: Any) -> list[tuple]:
     """(sin n x, cos n x) for n = 1..6."""
     found = [(sin, cos)]
     for _ in range(DEGREE - 1):
@@ -59,15 +64,28 @@ def multiples(sin, cos) -> list[tuple]:
     return found
 
 
-def product(e, k, odd, bends, tops, b):
-    """Product of k reflectances, for the coefficients ``e`` of `waves`; ``odd`` tells whether k is.
+def numerators(u: list[tuple], w: list[tuple]) -> list:
+    """Those of the closed sums for n = 1..6, from the `multiples` of u and w."""
+    return [cos_u * (cos_w if n % 2 else -sin_w) for n, ((_, cos_u), (sin_w, cos_w)) in enumerate(zip(u, w), 1)]
 
-    For n = 1..6, ``bends`` are cos(n u) cos(n w) for odd n and -cos(n u) sin(n w) for even n, ``tops`` are cos(n u),
-    and ``b`` are the `multiples` of b. Where sin(n b) vanishes, the sum has k terms of the same magnitude.
-    """
-    total = k * e[0]
-    for n, (bend, top, (sin, cos)) in enumerate(zip(bends, tops, b), 1):
+
+class Fan(NamedTuple):
+    """The mirror images that a path meets, by what the closed sums are made of; lists are for n = 1..6."""
+
+    k: Any  # how many
+    odd: Any  # whether k is
+    numerators: list
+    cos_u: list  # cos(n u)
+    b: list  # (sin n b, cos n b)
+
+
+def product(e: list, fan: Fan) -> Any:
+    """Product of all reflectances, for the coefficients ``e`` of `waves`."""
+    logarithm = fan.k * e[0]
+    for n, (numerator, cos_u, (sin, cos)) in enumerate(zip(fan.numerators, fan.cos_u, fan.b), 1):
+        # Where sin(n b) vanishes, the k terms are alike. For odd k they are that of n phi. For even k, n theta_j is an
+        # odd multiple of n b off n phi: another sign if n b is an odd number of half turns, whose cosine is -1.
         regular = dr.abs(sin) > 1e-3
-        peak = k * dr.select(odd | (cos > 0), top, -top) * (1 if n in (1, 4, 5) else -1)
-        total = total + e[n] * dr.select(regular, bend / dr.select(regular, sin, 1), peak)
-    return dr.exp(dr.minimum(total, 0))
+        alike = fan.k * dr.select(fan.odd | (cos > 0), cos_u, -cos_u) * TURNED[n - 1]
+        logarithm = logarithm + e[n] * dr.select(regular, numerator / dr.select(regular, sin, 1), alike)
+    return dr.exp(dr.minimum(logarithm, 0))

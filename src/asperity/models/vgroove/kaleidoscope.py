@@ -2,14 +2,25 @@
 
 In the plane across a groove, angles are from the surface's normal n, positive towards the horizontal direction t, and
 a direction of length ``l`` in that plane has the angle psi. The facet that light meets first, L, tilts towards t by
-``tilt_l``; the other, R, away from t by ``tilt_r``; grooves have depth 1. Met at the m-th mirror image, x_m is the
-angle between the ray and that image. Equations of Lee et al. 2018, whose angles are of the opposite sign, with the
-clamps that they need.
+``tilt_l``; the other, R, away from t by ``tilt_r``; grooves have depth 1. The images are numbered in the order in which
+a ray meets them: L is 1, the image of R in it is 2, and so on; R itself, which may shade L, is 0.
+
+    Lee et al. 2018              here
+    theta_i, theta_o             -psi, minus `exit_angle`: their angles are positive the other way round
+    theta_l, theta_r, theta_v    -``tilt_l``, ``tilt_r``, `Groove.aperture`; theta_s of symmetric grooves is the tilt
+    f(p)                         offset of a ray from the apex, the line through p that is parallel to the ray
+    f_a, f_2, f_k                `reach` of the images 1, 2, k; k_a is an odd image (of L), k_b an even one (of R)
+    f_b                          `reach` of 0, and at least 0
+    G                            `leaving_share`
+    theta_h, theta_d             ``theta`` of `Pair`; cos theta_d = i.h is ``length`` times ``cos_delta``
+
+Equations are theirs, with the clamps that they need.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -24,21 +35,21 @@ class Groove(NamedTuple):
     tilt_r: Any
 
     @property
-    def aperture(self):
+    def aperture(self) -> Any:
         """Angle between the facets, theta_v."""
         return dr.pi - self.tilt_l - self.tilt_r
 
-    def swapped(self, swap) -> Groove:
+    def swapped(self, swap: Any) -> Groove:
         """The same groove, seen from the other side where ``swap``."""
         return Groove(dr.select(swap, self.tilt_r, self.tilt_l), dr.select(swap, self.tilt_l, self.tilt_r))
 
 
-def meeting_angle(groove: Groove, psi, m):
-    """x_m, between the ray and the m-th mirror image; m = 0 is R, before L."""
+def meeting_angle(groove: Groove, psi: Any, m: Any) -> Any:
+    """x_m, between the ray and the m-th image."""
     return psi + dr.pi / 2 - groove.tilt_l + (m - 1) * groove.aperture
 
 
-def reach(groove: Groove, psi, m):
+def reach(groove: Groove, psi: Any, m: Any) -> Any:
     """f_m: offset from the apex up to which rays reflect at the m-th image; f_0 bounds the shadow (Eq. 6, 9).
 
     Zero, like the length seen, where the ray runs away from the image.
@@ -48,26 +59,36 @@ def reach(groove: Groove, psi, m):
     return dr.select(x < dr.pi, dr.sin(x) * dr.rcp(dr.sin(tilt)), 0)
 
 
-def leaving_share(groove: Groove, psi, k: int):
-    """G_k: share of L's area facing the light from which it leaves after k bounces; they add up to G1 (Eq. 6, 9)."""
-    first, shadow = reach(groove, psi, 1), dr.maximum(reach(groove, psi, 0), 0)
-    last = first
-    for m in {2, k - 1, k} & set(range(2, k + 1)):  # the sine is concave: no other image can be the narrowest
-        last = dr.minimum(last, reach(groove, psi, m))
-    lit = dr.maximum(last - dr.maximum(dr.minimum(last, reach(groove, psi, k + 1)), shadow), 0)
-    return dr.select(first > 0, lit / dr.select(first > 0, first, 1), 0)
+def reach_of_all(groove: Groove, psi: Any, k: int) -> Any:
+    """F_k = min(f_1, ..., f_k): offset up to which rays reflect k times at least.
+
+    The f_m of odd m are values of one sine, those of even m of another, at steps of twice the aperture. A sine is
+    concave on (0, pi), so that the least of each is its first or its last: one of f_1, f_2, f_(k-1), f_k.
+    """
+    images = (1, 2, k - 1, k) if k > 2 else range(1, k + 1)
+    return reduce(dr.minimum, [reach(groove, psi, m) for m in images])
 
 
-def exit_angle(groove: Groove, psi, k):
+def leaving_share(groove: Groove, psi: Any, k: int) -> Any:
+    """G_k: share of L's area facing the light from which it leaves after k bounces; they add up to G1 (Eq. 6, 9).
+
+    Of the offsets up to f_a, those below f_b are in the shadow, and those below F_(k+1) reflect again.
+    """
+    f_a, f_b = reach(groove, psi, 1), dr.maximum(reach(groove, psi, 0), 0)
+    leaves = dr.maximum(reach_of_all(groove, psi, k) - dr.maximum(reach_of_all(groove, psi, k + 1), f_b), 0)
+    return dr.select(f_a > 0, leaves / dr.select(f_a > 0, f_a, 1), 0)
+
+
+def exit_angle(groove: Groove, psi: Any, k: Any) -> Any:
     """Angle of the direction in which light leaves after k bounces (Eq. 5, 8)."""
     v = groove.aperture
     return dr.select(k % 2 == 1, 2 * groove.tilt_l - psi - (k - 1) * v, psi - dr.pi + k * v)
 
 
-def bounces(groove: Groove, psi, offset, most):
+def bounces(groove: Groove, psi: Any, offset: Any, most: Any) -> Any:
     """Number of bounces of the ray at this offset from the apex, at least 1; ``most`` + 1 stands for more."""
 
-    def reflects(k):  # again, after k bounces
+    def reflects(k: Any) -> Any:  # again, after k bounces
         return (k <= most) & (offset <= reach(groove, psi, k + 1)) & (meeting_angle(groove, psi, k + 1) < dr.pi)
 
     UInt = dr.uint32_array_t(type(psi))
@@ -75,15 +96,15 @@ def bounces(groove: Groove, psi, offset, most):
     return k
 
 
-def symmetric_bounces(groove: Groove, psi, offset, most):
-    """The same for facets of equal tilt, in closed form."""
+def symmetric_bounces(groove: Groove, psi: Any, offset: Any, most: Any) -> Any:
+    """The same for facets of equal tilt, in closed form (Eq. 4): a circle goes through the rims of all images."""
     UInt, half_aperture = dr.uint32_array_t(type(psi)), groove.aperture / 2
     x = dr.pi - psi - half_aperture - dr.asin(dr.clip(offset * dr.sin(groove.tilt_l), -1, 1))
     k = dr.ceil(x / dr.maximum(2 * half_aperture, 1e-6))
     return UInt(dr.clip(k, 1, type(psi)(most) + 1))
 
 
-def entrance(groove: Groove, psi, u):
+def entrance(groove: Groove, psi: Any, u: Any) -> tuple[Any, Any]:
     """(offset, swap): a ray's offset from the apex, uniform over the opening, and whether the ray meets R first.
 
     R is L of the mirrored groove, in which the ray's angle is -psi. ``u`` is in [0, 1).
@@ -112,7 +133,7 @@ class Pair:
     length: Any  # of both directions in that plane, l
 
     @classmethod
-    def of(cls, i, o) -> Pair:
+    def of(cls, i: Any, o: Any) -> Pair:
         """The pair of two unit vectors above the surface."""
         h = i + o
         # In the mirror direction the plane is any, and the plane of incidence as good as others.

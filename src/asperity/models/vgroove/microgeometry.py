@@ -30,7 +30,7 @@ class ExplicitGrooves:
     symmetric: bool = True
     facet: dict[str, Any] = field(default_factory=lambda: {"type": "conductor", "material": "none"})
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("alpha_u", "alpha_v"):
             _number(name, alpha := getattr(self, name))
             if not alpha > 0:

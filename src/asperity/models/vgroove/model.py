@@ -18,7 +18,7 @@ from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, varies
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
-from .fresnel import Metal, fit
+from .fresnel import Reflectance, fit
 from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric_bounces
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
@@ -116,8 +116,8 @@ class VGroove(LobeModel):
         metal = None
         if not self.metal.mirror:
             once = self.at("metal", si, active)
-            metal = Metal(once, fit(once) if self.logarithm is None else self.logarithm)
-        return [Grooves(self.kind(*self._alphas(si, active)), self.symmetric, self.most, metal)]
+            metal = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm)
+        return [GrooveLobe(self.kind(*self._alphas(si, active)), self.symmetric, self.most, metal)]
 
     def _alphas(self, si: Any, active: Any) -> tuple[Any, Any]:
         if self.alpha is None:
@@ -149,13 +149,13 @@ class VGroove(LobeModel):
 
 
 @dataclass
-class Grooves:
+class GrooveLobe:
     """The lobe of grooves: all ways through them, however many bounces that takes."""
 
     distribution: Distribution
     symmetric: bool
     most: Any  # bounces that are followed
-    metal: Metal | None  # None is a mirror
+    reflectance: Reflectance | None  # None is a mirror
 
     def share(self, wi: Any) -> Any:
         """All."""
@@ -166,7 +166,7 @@ class Grooves:
         pair = Pair.of(wi, wo)
         tilts = Tilts.along(self.distribution, pair.cos_azimuth, pair.sin_azimuth)
         brdf = symmetric if self.symmetric else nonsymmetric
-        return brdf(pair, wi.z, tilts, self.most, self.metal)
+        return brdf(pair, wi.z, tilts, self.most, self.reflectance)
 
     def draw(self, wi: Any, u: Any, v: Any) -> Any:
         """Follow a ray through a groove met by chance, to where all its ways of coming there are counted.

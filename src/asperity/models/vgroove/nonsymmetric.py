@@ -8,6 +8,12 @@ y = tau P - Q. Given the partner's tilt r, the tilt l of the facet that is met f
     J = 1 / sin theta for k = 1, 2 / ((k + 1) sin theta) for odd, 2 / (k sin theta) for even k,
 
 g' = g sin l sin r being the width of the rays that leave after k bounces. C is wrong in the paper's appendix C.
+
+    Lee et al. 2018              here
+    theta_l, theta_r             -l, r
+    P(theta_r)                   D(r) sin^2 r / C, the density of `Tilts.sample_partner`
+    ds_l / do                    J sin l / (4 l_pair cos delta), l_pair the ``length`` of the `Pair`
+    f_a, f_b, f_2, f_k           `_reaches`: f_1, max(f_0, 0), f_2; f_k and its neighbours by the reversed path
 """
 
 from __future__ import annotations
@@ -20,7 +26,7 @@ import drjit as dr
 
 from ...microfacet.distributions import GGX, Beckmann, Phong
 from ...microfacet.quadrature import accumulate, integrate
-from .fresnel import Metal, multiples, product, waves
+from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
 from .kaleidoscope import Pair
 from .symmetric import POLE, numbered
 from .tilts import Tilts
@@ -32,59 +38,68 @@ A density has to be exact to .05 % or so: what its integral misses looks like lo
 """
 
 
-def nonsymmetric(pair: Pair, cos_i, tilts: Tilts, most, metal: Metal | None) -> tuple[Any, Any]:
-    """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``metal`` is None."""
+def nonsymmetric(pair: Pair, cos_i: Any, tilts: Tilts, most: Any, reflectance: Reflectance | None) -> tuple[Any, Any]:
+    """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``reflectance`` is None."""
     pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
-    captured = pair, tilts, pole, () if metal is None else waves(metal.logarithm, pair.length)
+    captured = pair, tilts, pole, [] if reflectance is None else waves(reflectance.logarithm, pair.length)
 
-    def with_bounces(totals, counted, nodes, double):
+    def with_bounces(totals: tuple, counted: tuple, nodes: int, double: bool) -> tuple:
         count, numbers = counted
 
-        def term(index, captured):
-            (k, odd, tau), (pair, tilts, pole, through) = numbers(index), captured
+        def term(index: Any, captured: Any) -> tuple:
+            (k, odd, tau), (pair, tilts, pole, e) = numbers(index), captured
             p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
             way = Way(k, odd, tau * p, q)
             weight, mean, variance = moments(way, tilts, nodes, double)
             weight = weight * 2 * pole / dr.select(odd, k + 1, k)
-            if not through:
+            if not e:
                 return (weight,)
             # The product varies little over the grooves: one node, or two, of the Gauss rule for their distribution.
             if not double:
-                return weight, weight * way.through(mean, through)
+                return weight, weight * way.reflected(mean, e)
             spread = dr.sqrt(dr.maximum(variance, 1e-12))
-            return weight, weight / 2 * (way.through(mean - spread, through) + way.through(mean + spread, through))
+            return weight, weight / 2 * (way.reflected(mean - spread, e) + way.reflected(mean + spread, e))
 
         return accumulate(term, count, totals, captured)
 
     few, double, multiple = NODES[tilts.distribution]
-    single, below = _single(pair, tilts, few), limits(pair)
-    totals = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
-    totals = with_bounces(totals, numbered(below, dr.minimum(most, type(most)(2))), double, True)
-    totals = with_bounces(totals, numbered(below, most, lowest=(3, 3, 4, 4)), multiple, False)
+    single, limits = _single(pair, tilts, few), bounce_limits_nonsymmetric(pair)
+    totals: tuple = (single,)
+    if reflectance is not None:
+        totals = single, single * reflectance.once(pair.length * pair.cos_delta)
+    totals = with_bounces(totals, numbered(limits, dr.minimum(most, type(most)(2))), double, True)
+    totals = with_bounces(totals, numbered(limits, most, first_even=4), multiple, False)
     scale = dr.rcp(4 * cos_i * pair.cos_delta * tilts.partner())
     return scale * totals[-1], scale * totals[0]
 
 
-def limits(pair: Pair):
-    """Numbers that k stays below, as in `symmetric`: where the intervals of integration become empty."""
+def bounce_limits_nonsymmetric(pair: Pair) -> tuple:
+    """Numbers that k stays below, as in `symmetric`: where the intervals of integration become empty.
+
+    Odd k have a second limit, since both directions meet the facet of tilt l: with the `_reaches` of both, f_0 < f_k is
+    cos y cot l + cos x cot r > sin x - sin y. The cotangents are tangents of two angles that add up to the aperture v,
+    so that their sum is at most tan v, and
+
+        tan v > 2 cos P sin Q / max(cos x, cos y) = 2 cos P sin Q / cos(P - Q),
+
+    while l < pi/2 leaves v = (2 l - 2 tau P) / (k - 1) < (pi - 2 tau P) / (k - 1).
+    """
     theta, delta = pair.theta, pair.delta
-    # Of odd k, both first facets have the tilt l: f_0 < f_k is cos(y) cot(l) + cos(x) cot(r) > sin(x) - sin(y), and the
-    # cotangents are tangents of angles that add up to the aperture, at most (pi - 2 tau P) / (k - 1).
     nearer = pair.cos_theta * pair.cos_delta + pair.sin_theta * pair.sin_delta
     least = dr.maximum(dr.atan2(2 * pair.sin_delta * pair.cos_theta, nearer), 1e-6)
 
-    def odd(tau):
+    def odd(tau: int) -> Any:
         above = dr.pi - 2 * tau * theta
         return dr.minimum(above / dr.maximum(delta - tau * theta, 1e-6) - 1, above / least + 1)
 
-    def even(tau):
+    def even(tau: int) -> Any:
         below = theta if tau > 0 else theta + delta + dr.maximum(delta - theta, 0)
         return (dr.pi - 2 * tau * delta) / dr.maximum(below, 1e-6)
 
     return odd(1), odd(-1), even(1), even(-1)
 
 
-def _single(pair: Pair, tilts: Tilts, nodes: int):
+def _single(pair: Pair, tilts: Tilts, nodes: int) -> Any:
     """The integral of a single bounce, from a facet whose normal is the half vector.
 
     Over t with tan r = alpha tan t, in which D varies evenly, and on either side of the tilt that begins to shade.
@@ -92,7 +107,7 @@ def _single(pair: Pair, tilts: Tilts, nodes: int):
     l, x = (pair.sin_theta, pair.cos_theta), dr.sincos(pair.theta + pair.delta)
     shade = dr.atan2(x[1], tilts.alpha * x[0])
 
-    def at(node, captured):
+    def at(node: Any, captured: Any) -> tuple:
         total, (tilts, l, x, shade) = 0, captured
         alpha = tilts.alpha
         for low, high in ((0, shade), (shade, dr.pi / 2)):
@@ -117,13 +132,17 @@ class Way:
     p: Any  # tau P
     q: Any
 
-    def first_tilt(self, r):
+    def first_tilt(self, r: Any) -> Any:
         """The tilt l."""
         k, p = self.k, self.p
         return dr.select(self.odd, (2 * p + (k - 1) * (dr.pi - r)) / (k + 1), dr.pi - (dr.pi - 2 * p) / k - r)
 
-    def interval(self):
-        """(least r, length): where both tilts are in (0, pi/2) and, as far as that is simple, the width is not 0."""
+    def interval(self) -> tuple[Any, Any]:
+        """(least r, length): where both tilts are in (0, pi/2) and, as far as that is simple, the width is not 0.
+
+        For odd k that bounds l, which falls with r: l < pi/2 + y, else f_k < 0. For even k, l < pi/2 + x, else f_1 < 0;
+        r < pi/2 + y, else f_k < 0; and r < pi/2 - Q, else f_0 > f_k.
+        """
         k, p, q, up = self.k, self.p, self.q, dr.pi / 2
         x, y = p + q, p - q
         v = (dr.pi - 2 * p) / k
@@ -134,35 +153,39 @@ class Way:
         low, high = dr.maximum(low, 0), dr.minimum(high, up)
         return low, dr.maximum(high - low, 0)
 
-    def kinks(self, low, high):
+    def kinks(self, low: Any, high: Any) -> tuple:
         """The tilts r of k = 2 at which g' has a kink, in order, from ``low`` to ``high``.
 
-        With s = r - l + Q its terms are all sums of a constant and the cosine of one of (pi/2 + tau P) +- s.
+        With p = tau P, l + r = pi/2 + p and s = r - l + Q, its `_reaches` are
+
+            2 f_1 = cos Q + sin(p + s),   2 f_0 = sin(p + s) - cos(2 p + Q),
+            2 f_2 = cos Q + sin(p - s),   2 f_3 = sin(p - s) - cos(2 p - Q),
+
+        and g' = min(f_1, f_2) - max(f_0, f_3, 0) has a kink at s = 0, where f_1 = f_2. The others are where f_3 falls
+        to 0 and where f_0 rises from 0; but where f_0 = f_3, which is sin s = -2 sin p sin Q, if it rises first.
         """
         p, q, up = self.p, self.q, dr.pi / 2
-        middle = (up + p - q) / 2  # f_1 = f_2
-        shaded, blocked = up - p - q, 2 * p - q  # f_0 > 0 beyond the one, f_3 > 0 before the other
-        cross = middle + dr.asin(dr.clip(-2 * dr.sin(p) * dr.sin(q), -1, 1)) / 2  # f_0 = f_3
-        overlap = blocked > shaded
-        a, b = dr.select(overlap, cross, blocked), dr.select(overlap, cross, shaded)
-        a, b, c = (dr.clip(kink, low, high) for kink in (middle, a, b))
-        small, large = dr.minimum(a, b), dr.maximum(a, b)
-        return low, dr.minimum(small, c), dr.maximum(small, dr.minimum(large, c)), dr.maximum(large, c), high
+        middle = (up + p - q) / 2  # r at s = 0; at any s, r = middle + s/2
+        f_3_ends, f_0_begins = 2 * p - q, up - p - q  # cos(y + l) = 0, cos(x + r) = 0
+        equal = middle + dr.asin(dr.clip(-2 * dr.sin(p) * dr.sin(q), -1, 1)) / 2
+        overlap = f_3_ends > f_0_begins
+        a, b = dr.select(overlap, equal, f_3_ends), dr.select(overlap, equal, f_0_begins)  # a <= b
+        in_order = dr.minimum(middle, a), dr.maximum(a, dr.minimum(middle, b)), dr.maximum(middle, b)
+        return low, *(dr.clip(kink, low, high) for kink in in_order), high
 
-    def through(self, r, e):
+    def reflected(self, r: Any, e: list) -> Any:
         """Product of the reflectances in the groove with this r: u = Q and w = tau P, shifted by half r - l."""
         l = self.first_tilt(r)
         turn = (r - l) / 2
         u = multiples(*dr.sincos(self.q + dr.select(self.odd, 0, turn)))
         w = multiples(*dr.sincos(self.p + dr.select(self.odd, turn, 0)))
         b = multiples(*dr.sincos((dr.pi - l - r) / 2))
-        bends = [c * d if n % 2 else -c * z for n, ((_, c), (z, d)) in enumerate(zip(u, w), 1)]
-        return product(e, self.k, self.odd, bends, [cos for _, cos in u], b)
+        return product(e, Fan(self.k, self.odd, numerators(u, w), [cos for _, cos in u], b))
 
 
 @dataclass
 class Width:
-    """g', the width of the rays that leave a groove after k bounces."""
+    """g', the width of the rays that leave a groove after k bounces: those up to F_k, but for f_b and F_(k+1)."""
 
     odd: Any
     x: tuple  # sine and cosine
@@ -173,21 +196,21 @@ class Width:
         """That of a way."""
         return cls(way.odd, dr.sincos(way.p + way.q), dr.sincos(way.p - way.q))
 
-    def __call__(self, l, r):
+    def __call__(self, l: tuple, r: tuple) -> Any:
         """For (sin l, cos l) and (sin r, cos r)."""
-        near, far = (tuple(dr.select(self.odd, a, b) for a, b in zip(*two)) for two in ((l, r), (r, l)))
+        last, other = (tuple(dr.select(self.odd, a, b) for a, b in zip(*two)) for two in ((l, r), (r, l)))
         f_0, f_1, f_2 = _reaches(self.x, l, r)
-        f_next, f_k, f_before = _reaches(self.y, near, far)
-        lit = dr.minimum(dr.minimum(f_1, f_2), dr.minimum(f_before, f_k))
-        return dr.maximum(lit - dr.maximum(dr.maximum(f_0, f_next), 0), 0)
+        f_after, f_k, f_before = _reaches(self.y, last, other)  # f_(k+1), f_k, f_(k-1)
+        all_k = dr.minimum(dr.minimum(f_1, f_2), dr.minimum(f_before, f_k))  # F_k, by `kaleidoscope.reach_of_all`
+        return dr.maximum(all_k - dr.maximum(dr.maximum(f_0, f_after), 0), 0)
 
 
-def moments(way: Way, tilts: Tilts, nodes: int, double: bool):
+def moments(way: Way, tilts: Tilts, nodes: int, double: bool) -> tuple[Any, Any, Any]:
     """(integral of D(l) sin l D(r) sin r g' over r, mean r, variance of r); ``double`` tells that k = 2."""
     low, extent = way.interval()
     ends = way.kinks(low, low + extent) if double else (low, low + extent)
 
-    def at(node, captured):
+    def at(node: Any, captured: Any) -> tuple:
         (way, tilts, ends, width), sums = captured, [0, 0, 0]
         for begin, end in pairwise(ends):
             tilt = begin + (end - begin) * node
@@ -201,10 +224,11 @@ def moments(way: Way, tilts: Tilts, nodes: int, double: bool):
     return total, mean, square - mean * mean
 
 
-def _reaches(x, near, far):
+def _reaches(x: tuple, near: tuple, far: tuple) -> tuple[Any, Any, Any]:
     """f_0, f_1, f_2 times sin l sin r, of light that meets the ``near`` facet first; arguments are sines and cosines.
 
-    For y these are f_(k+1), f_k, f_(k-1): paths are reversible.
+    By `kaleidoscope.reach`: -sin(near) cos(x + far), sin(far) cos(x - near), -sin(near) cos(x - 2 near - far).
+    Of the reversed path, from y, they are f_(k+1), f_k, f_(k-1), and the near facet is that of the last bounce.
     """
     (sin_x, cos_x), (sin_near, cos_near), (sin_far, cos_far) = x, near, far
     sin, cos = sin_x * cos_near - cos_x * sin_near, cos_x * cos_near + sin_x * sin_near  # of x - near

@@ -7,20 +7,22 @@ Terms are numbered by the bounces k and by the side tau, +1 if the facet met fir
     f cos_o = sum D(pi/2 - b) g J prod F / (4 cos_i cos delta),   b = (pi/2 - tau P) / k,
     g = max(0, min(sin(b + tau P - Q), 2 cos P sin(b - Q))),   J = cos b / (k sin theta), or 1 if k = 1,
 
-where b is half the groove's aperture. g > 0 if k < (pi/2 - tau P) / (Q, or P + Q for tau = -1): few terms remain,
-except near the mirror direction.
+where b is half the groove's aperture, theta_v / 2: derived in docs/vgroove.md. g > 0 if k < (pi/2 - tau P) / Q, or
+(pi/2 + P) / (P + Q) for tau = -1: few terms remain, except near the mirror direction.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import accumulate as running_sums
 from typing import Any
 
 import drjit as dr
 
 from ...microfacet.masking import cavity_visible
 from ...microfacet.quadrature import accumulate
-from .fresnel import Metal, multiples, product, waves
+from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
 from .kaleidoscope import Pair
 from .tilts import Tilts
 
@@ -29,106 +31,115 @@ POLE = 1e-4
 energy of GGX with alpha 1, and less of others."""
 
 
-def symmetric(pair: Pair, cos_i, tilts: Tilts, most, metal: Metal | None) -> tuple[Any, Any]:
-    """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``metal`` is None."""
+def symmetric(pair: Pair, cos_i: Any, tilts: Tilts, most: Any, reflectance: Reflectance | None) -> tuple[Any, Any]:
+    """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``reflectance`` is None."""
     pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
-    count, numbers = numbered(limits(pair), most)
+    count, numbers = numbered(bounce_limits(pair), most)
 
-    def term(index, captured):
-        (k, odd, tau), (pole, tilts, share, *through) = numbers(index), captured
-        b = (dr.pi / 2 - tau * dr.select(odd, share.pair.theta, share.pair.delta)) / k
+    def term(index: Any, captured: Any) -> tuple:
+        (k, odd, tau), (pole, tilts, lit, *through) = numbers(index), captured
+        b = (dr.pi / 2 - tau * dr.select(odd, lit.pair.theta, lit.pair.delta)) / k
         sin, cos = dr.sincos(b)
-        value = pole * cos / k * tilts.density(cos, sin) * share(odd, tau, sin, cos)
+        value = pole * cos / k * tilts.density(cos, sin) * lit(odd, tau, sin, cos)
         return (value, *(value * reflectances(k, odd, tau, sin, cos) for reflectances in through))
 
     single = tilts.density(pair.sin_theta, pair.cos_theta) * cook_torrance_share(pair)
-    start = (single,) if metal is None else (single, single * metal.once(pair.length * pair.cos_delta))
-    captured = (pole, tilts, Share.of(pair), *(() if metal is None else (Through.of(pair, metal),)))
+    captured: tuple = (pole, tilts, Lit.of(pair))
+    start: tuple = (single,)
+    if reflectance is not None:
+        captured = (*captured, Through.of(pair, reflectance))
+        start = (single, single * reflectance.once(pair.length * pair.cos_delta))
     totals = accumulate(term, count, start, captured)
     scale = dr.rcp(4 * cos_i * pair.cos_delta)
     return scale * totals[-1], scale * totals[0]
 
 
-def cook_torrance_share(pair: Pair):
+def cook_torrance_share(pair: Pair) -> Any:
     """g of a single bounce: what the steeper of the directions, which the cavity hides more, sees of the facet h."""
     beyond = pair.cos_theta * pair.cos_delta - pair.sin_theta * pair.sin_delta  # its cosine; all are divided by l
     return cavity_visible(pair.cos_delta, beyond, pair.cos_theta)
 
 
-def limits(pair: Pair):
-    """Numbers that k stays below, for (odd, tau = 1), (odd, -1), (even, 1), (even, -1)."""
+def bounce_limits(pair: Pair) -> list:
+    """Numbers that k stays below, for each kind of terms that `numbered` tells apart."""
     theta, delta, both = pair.theta, pair.delta, pair.theta + pair.delta
     half = dr.pi / 2
     ranges = (half - theta, delta), (half + theta, both), (half - delta, theta), (half + delta, both)
     return [above / dr.maximum(below, 1e-6) for above, below in ranges]
 
 
-def numbered(limits, most, lowest=(3, 3, 2, 2)):
-    """(n, f): how many terms have k from ``lowest`` to ``most`` and below the `limits`, and f(0..n-1) = (k, odd, tau).
+def numbered(limits: Any, most: Any, first_even: int = 2) -> tuple[Any, Callable]:
+    """(n, f): how many terms of several bounces there are, and f(0..n-1) = (k, odd, tau) of each.
 
-    Without gaps: in a loop over them no lane waits for others to find out that a term is empty.
+    They are of four kinds: odd k with tau = 1, odd k with -1, even k with 1, even k with -1. Odd k begin at 3, even k
+    at ``first_even``; they end at ``most``, and below the kind's limit. Kind after kind, they are numbered without
+    gaps: in a loop over them no lane waits for others to find out that a term is empty.
     """
-    Float, UInt = type(limits[0]), type(most)
-    ends, end = [], UInt(0)
-    for below, first in zip(limits, lowest):
-        beyond = UInt(dr.ceil(dr.minimum(dr.detach(below), Float(most) + 1)))
-        end = end + dr.select(beyond > first, (beyond + 1 - first) // 2, 0)
-        ends.append(end)
+    Float, UInt, first_odd = type(limits[0]), type(most), 3
 
-    def term(index):
-        later = [index >= end for end in ends[:3]]
-        begin = dr.select(later[0], dr.select(later[1], dr.select(later[2], ends[2], ends[1]), ends[0]), 0)
+    def terms(limit: Any, first: int) -> Any:  # how many of first, first + 2, ... are below it
+        beyond = UInt(dr.ceil(dr.minimum(dr.detach(limit), Float(most) + 1)))
+        return dr.select(beyond > first, (beyond + 1 - first) // 2, 0)
+
+    counts = map(terms, limits, (first_odd, first_odd, first_even, first_even))
+    ends = list(running_sums(counts))  # of the kinds' numbers
+
+    def term(index: Any) -> tuple[Any, Any, Any]:
         odd = index < ends[1]
-        tau = dr.select(dr.select(odd, later[0], later[2]), Float(-1), Float(1))
-        return 2 * (index - begin) + dr.select(odd, UInt(lowest[0]), UInt(lowest[2])), odd, tau
+        minus = dr.select(odd, index >= ends[0], index >= ends[2])
+        begin = dr.select(odd, dr.select(minus, ends[0], 0), dr.select(minus, ends[2], ends[1]))
+        k = 2 * (index - begin) + dr.select(odd, UInt(first_odd), UInt(first_even))
+        return k, odd, dr.select(minus, Float(-1), Float(1))
 
     return ends[3], term
 
 
 @dataclass
-class Share:
+class Lit:
     """g of k >= 2; without trigonometric functions of its own, and without cancellation where it is small."""
 
     pair: Pair
-    sums: tuple  # cosines and sines of theta and delta, multiplied like with like
-    sines: tuple  # and one with the other
+    cos_cos: Any  # cos theta cos delta
+    sin_sin: Any
+    sin_cos: Any  # sin theta cos delta
+    cos_sin: Any
 
     @classmethod
-    def of(cls, pair: Pair) -> Share:
+    def of(cls, pair: Pair) -> Lit:
         """What does not depend on the term."""
-        sums = pair.cos_theta * pair.cos_delta, pair.sin_theta * pair.sin_delta
-        return cls(pair, sums, (pair.sin_theta * pair.cos_delta, pair.cos_theta * pair.sin_delta))
+        cos_cos, sin_sin = pair.cos_theta * pair.cos_delta, pair.sin_theta * pair.sin_delta
+        return cls(pair, cos_cos, sin_sin, pair.sin_theta * pair.cos_delta, pair.cos_theta * pair.sin_delta)
 
-    def __call__(self, odd, tau, sin, cos):
+    def __call__(self, odd: Any, tau: Any, sin: Any, cos: Any) -> Any:
         """g, for the sine and cosine of b."""
-        pair, (a, b) = self.pair, self.sums
-        p, q = dr.select(odd, self.sines[0], self.sines[1]), dr.select(odd, self.sines[1], self.sines[0])
-        lit = sin * (a + tau * b) + cos * (tau * p - q)  # sin(b + tau P - Q)
+        pair = self.pair
+        sin_p_cos_q = dr.select(odd, self.sin_cos, self.cos_sin)
+        cos_p_sin_q = dr.select(odd, self.cos_sin, self.sin_cos)
+        one = sin * (self.cos_cos + tau * self.sin_sin) + cos * (tau * sin_p_cos_q - cos_p_sin_q)  # sin(b + tau P - Q)
         sin_q, cos_q = dr.select(odd, pair.sin_delta, pair.sin_theta), dr.select(odd, pair.cos_delta, pair.cos_theta)
         cos_p = dr.select(odd, pair.cos_theta, pair.cos_delta)
-        return dr.maximum(dr.minimum(lit, 2 * cos_p * (sin * cos_q - cos * sin_q)), 0)
+        return dr.maximum(dr.minimum(one, 2 * cos_p * (sin * cos_q - cos * sin_q)), 0)
 
 
 @dataclass
 class Through:
-    """The product of the reflectances: u = Q and w = tau P, the same for all k of a parity."""
+    """The product of the reflectances, in which u = Q and w = tau P: the same for all k that are odd, or even."""
 
     waves: list
-    tops: list
-    bends: list
+    cos_u: list  # pairs, for odd and for even k
+    numerators: list  # for tau = 1
 
     @classmethod
-    def of(cls, pair: Pair, metal: Metal) -> Through:
-        """What does not depend on the term; pairs are for odd and even k."""
+    def of(cls, pair: Pair, reflectance: Reflectance) -> Through:
+        """What does not depend on the term."""
         theta, delta = multiples(pair.sin_theta, pair.cos_theta), multiples(pair.sin_delta, pair.cos_delta)
-        tops = [(d, t) for (_, t), (_, d) in zip(theta, delta)]
-        bends = [
-            (d * t, d * t) if n % 2 else (-d * z, -t * y) for n, ((z, t), (y, d)) in enumerate(zip(theta, delta), 1)
-        ]
-        return cls(waves(metal.logarithm, pair.length), tops, bends)
+        cos_u = [(cos_delta, cos_theta) for (_, cos_theta), (_, cos_delta) in zip(theta, delta)]
+        both = list(zip(numerators(u=delta, w=theta), numerators(u=theta, w=delta)))
+        return cls(waves(reflectance.logarithm, pair.length), cos_u, both)
 
-    def __call__(self, k, odd, tau, sin, cos):
+    def __call__(self, k: Any, odd: Any, tau: Any, sin: Any, cos: Any) -> Any:
         """Product of k reflectances, for the sine and cosine of b."""
-        bends = [(1 if n % 2 else tau) * dr.select(odd, *bend) for n, bend in enumerate(self.bends, 1)]
-        tops = [dr.select(odd, *top) for top in self.tops]
-        return product(self.waves, k, odd, bends, tops, multiples(sin, cos))
+        # sin(n w) and with it those of even n change sign with tau, cos(n w) does not.
+        signed = [(1 if n % 2 else tau) * dr.select(odd, *both) for n, both in enumerate(self.numerators, 1)]
+        cos_u = [dr.select(odd, *both) for both in self.cos_u]
+        return product(self.waves, Fan(k, odd, signed, cos_u, multiples(sin, cos)))
