@@ -130,7 +130,7 @@ def measure(
     if tensor is not None:
         from asperity.goniophotometer import tensor_file
 
-        tensor_file.grid(chosen, incident)  # complains now, not after the tracing
+        tensor_file.angles_of_incidence(chosen, incident)  # complains now, not after the tracing
     effort = {"paths": paths, "tiles": tiles, "seed": seed, "wavelengths": wavelengths, "before": earlier}
     start, interrupted = time.perf_counter(), ctx.with_resource(passes.interruptible())
     measured = traced(

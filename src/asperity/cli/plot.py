@@ -31,7 +31,7 @@ def plot(
         if description is not None:
             first = measured.about["channels"][0]
             variants.choose("llvm_ad_spectral" if first.endswith("nm") else "llvm_ad_mono" if first == "Y" else None)
-        figure = plots.draw(measured, description)
+        figure = plots.figure(measured, description)
         with atomically(out) as part:
             figure.savefig(part)
     typer.echo(out)

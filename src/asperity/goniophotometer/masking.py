@@ -88,7 +88,7 @@ def measure_masking(
     batch = max(BATCH // len(pairs), 1) * len(pairs)  # lanes take the pairs in turn
     counts, parts = [], []
     for number in range(tiles):
-        tile = geometry.tile(np.random.default_rng([seed, number]))
+        tile = geometry.piece(np.random.default_rng([seed, number]))
         if not isinstance(tile, Tile):
             raise ParameterError(f"masking needs shapes that one can look at, not {type(tile).__name__}.")
         parts = list(tile.facets())

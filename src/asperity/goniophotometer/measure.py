@@ -95,7 +95,7 @@ def measure(
         for row, (tile_seed, number) in enumerate(result.labels):
             if np.all(result.paths[row] >= result.goal[row]):
                 continue
-            tile = geometry.tile(np.random.default_rng([tile_seed, number]))
+            tile = geometry.piece(np.random.default_rng([tile_seed, number]))
             if isinstance(sensor, Points):
                 _check_facets(tile)
             if done == 0:

@@ -43,16 +43,16 @@ class Triangulated:
         """How many faces do not look up; there are none in a height field."""
         return int(np.count_nonzero(normals(*self.triangles[:2])[:, 2] <= 0))
 
-    def tile(self, rng: np.random.Generator) -> Tile:
+    def piece(self, rng: np.random.Generator) -> Tile:
         """Always the same tile, built when it is first asked for, of the variant that is then in use.
 
         It is scaled by a power of two, so that the unit of length cannot matter: its larger side is in [1, 2). Rays
         were seen to miss triangles with edges of 3e-10.
         """
-        return self._tile
+        return self._piece
 
     @cached_property
-    def _tile(self) -> Tile:
+    def _piece(self) -> Tile:
         vertices, faces, uv, (width, depth, height) = self.triangles
         if self.periodic == "mirror":
             vertices, faces, uv = _mirrored(self.triangles)

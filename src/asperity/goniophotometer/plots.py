@@ -55,7 +55,7 @@ class Line(NamedTuple):
 ALL = Line(None, None, "sum", "black", "o")
 
 
-def draw(measured: Measurement, model: dict[str, Any] | None = None) -> Figure:
+def figure(measured: Measurement, model: dict[str, Any] | None = None) -> Figure:
     """A figure: a row for each direction of incidence, and below them the albedos, if there are several.
 
     ``model`` is the description of a BSDF to draw as well; it needs a variant with the measurement's channels.
@@ -202,7 +202,7 @@ def maps(measured: Measurement, k: int, paint: Any, left: Axes, right: Axes) -> 
     """Fill two axes: the BSDF, all orders together, and its relative standard error; scales serve all directions."""
     value, error = curve(measured, k, *each(measured.sensor), ALL)
     value = np.where(value > 0, value, np.nan)  # logarithms have no place for cells without light
-    low, high = limits(measured)
+    low, high = brightness_range(measured)
     channels = ", mean of " + ", ".join(measured.about["channels"]) if differ(measured) else ""
     for axes, values, name, norm, colours in (
         (left, value, QUANTITY + channels, LogNorm(low, high), "viridis"),
@@ -225,7 +225,7 @@ def profile(measured: Measurement, k: int, bsdf: Any, bins: tuple[Any, Any], edg
                 axes.stairs(values, edges, baseline=None, **style)
     value, _ = curve(measured, k, *bins, ALL)
     if 0 < np.median(value) < value.max() / STEEP:
-        axes.set(yscale="log", ylim=(limits(measured)[0], None))
+        axes.set(yscale="log", ylim=(brightness_range(measured)[0], None))
     else:
         axes.set(ylim=(0, None))
     axes.set(ylabel=QUANTITY)
@@ -233,7 +233,7 @@ def profile(measured: Measurement, k: int, bsdf: Any, bins: tuple[Any, Any], edg
     legend(axes)
 
 
-def limits(measured: Measurement) -> tuple[float, float]:
+def brightness_range(measured: Measurement) -> tuple[float, float]:
     """Of the logarithmic scales."""
     values = measured.summed.value.mean(axis=-1)
     values = values[values > 0]
