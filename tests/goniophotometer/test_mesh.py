@@ -12,7 +12,7 @@ import pytest
 from surfaces import COARSE, FLAT, WHITE, agrees, closed, mesh_file, run, waves, write
 
 from asperity.errors import AsperityError, UnreadableFileError
-from asperity.goniophotometer.mesh import HeightField, Mesh
+from asperity.goniophotometer.mesh import HeightField, Mesh, from_file
 from asperity.lab import evaluate
 
 MIRROR = {"type": "conductor", "material": "none"}
@@ -114,6 +114,22 @@ def test_geometries_travel(rgb, tmp_path, copied):
         assert twin.description == geometry.description and vars(twin).keys() < vars(geometry).keys()
         assert np.array_equal(run(twin, paths=2**10).energy, before.energy)
     assert not twin.heights.flags.writeable
+
+
+def test_surfaces_by_their_kind(rgb, tmp_path):
+    mesh_file(tmp_path / "flat.ply", FLAT)
+    np.save(tmp_path / "flat.npy", FLAT)
+    mesh = from_file("mesh", tmp_path / "flat.ply", periodic="mirror", spacing=None)
+    field = from_file("heightfield", tmp_path / "flat.npy", spacing=0.5, level=True)
+    assert isinstance(mesh, Mesh) and mesh.periodic == "mirror" and mesh.bsdf == {"type": "diffuse"}
+    assert isinstance(field, HeightField) and field.spacing == (0.5, 0.5) and field.level
+    for kind, options, words in (
+        ("mesh", {"spacing": 1}, "spacing: makes no sense with a mesh"),
+        ("heightfield", {}, "spacing: a height field needs"),
+        ("meshes", {}, "Did you mean 'mesh'"),
+    ):
+        with pytest.raises(AsperityError, match=words):
+            from_file(kind, tmp_path / "flat.ply", **options)
 
 
 def moved(k, point):
