@@ -78,8 +78,7 @@ def measure_masking(
     check_effort(wi, points, tiles, seed)
     if wo is not None and len(wo) != len(wi):
         raise ParameterError(f"wo: expected as many directions as wi has ({len(wi)}).")
-    for angles in pairs:
-        check_angles(angles)
+    check_angles(wo or ())
     if overhangs := getattr(geometry, "overhangs", 0):
         raise ParameterError(
             f"masking needs a height field, and {overhangs} faces overhang: some of it is out of sight."
