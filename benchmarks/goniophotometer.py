@@ -70,7 +70,7 @@ def meshed(geometry, seed, rings=6, sectors=16):
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"], parameters["faces"] = np.float32(vertices).ravel(), np.uint32(faces).ravel()
     parameters.update()
-    tile = geometry.tile(np.random.default_rng(seed))
+    tile = geometry.piece(np.random.default_rng(seed))
     base = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale([tile.width, tile.depth, 1])}
     return tile._replace(scene=mi.load_dict({"type": "scene", "grains": mesh, "base": base}))
 
@@ -87,7 +87,7 @@ def main():
     for grains in (10**3, 4096, 10**4, 10**5, *([] if quick else [10**6])):
         geometry = ExplicitGrains(0.5, base=WHITE, grains=grains)
         start = time.perf_counter()
-        tile = geometry.tile(np.random.default_rng(1))
+        tile = geometry.piece(np.random.default_rng(1))
         built = time.perf_counter() - start
         every, rays = paths(tile, 2, repeats)
         first, _ = paths(tile, 1, repeats)

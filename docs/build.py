@@ -63,7 +63,7 @@ def figures(folder: Path) -> None:
     grains = {"type": "micrograin", "tau_0": 0.5}
     angles = [(60.0, 0.0), (86.0, 0.0)]
     measured = measure(MODELS["micrograin"].microgeometry(grains), angles, orders=1, paths=2e7, about={"model": grains})
-    save(plots.draw(measured, grains), folder / "grains.png")
+    save(plots.figure(measured, grains), folder / "grains.png")
     save(vgroove.furnace_spheres(), folder / "furnace-vgroove.png")
     save(lambertsphere.ball(report.Effort(4e6, 32)).figures["ball"], folder / "ball.png")
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import Any
 
 
 class AsperityError(ValueError):
@@ -34,6 +35,13 @@ def suggestion(given: str, allowed: Collection[str]) -> str:
     nearest = difflib.get_close_matches(given, allowed, n=1, cutoff=0.5)
     hint = f"Did you mean {nearest[0]!r}? " if nearest else ""
     return f"{hint}Allowed: {', '.join(allowed)}."
+
+
+def refuse_unused(options: Mapping[str, Any], used: Collection[str], what: str) -> None:
+    """Raise ParameterError if an option is given, not None, that would be ignored."""
+    for option, value in options.items():
+        if value is not None and option not in used:
+            raise ParameterError(f"{option}: makes no sense with {what}.")
 
 
 def readable(what: str, path: str | Path, formats: Collection[str]) -> Path:

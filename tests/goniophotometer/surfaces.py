@@ -45,7 +45,7 @@ end_header
     return path
 
 
-def grid(path, heights, shift=(0, 0, 0)):
+def mesh_file(path, heights, shift=(0, 0, 0)):
     """The heights as a mesh of unit width and depth, in a file."""
     shape = HeightField(heights, 1 / (np.array(heights.shape[::-1]) - 1), periodic="mirror").triangles
     return write(path, shape.vertices + shift, shape.faces)

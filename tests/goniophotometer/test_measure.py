@@ -11,8 +11,9 @@ from scipy import stats
 import asperity  # noqa: F401
 from asperity.errors import AsperityError, ParameterError, UnknownNameError
 from asperity.goniophotometer import Hemisphere, Measurement, Points, Window, measure, merge
-from asperity.goniophotometer.sensors import directions, from_description
+from asperity.goniophotometer.sensors import by_name, directions, from_description
 from asperity.lab import evaluate
+from asperity.models.lambertsphere import RandomWalk
 from asperity.models.micrograin import ExplicitGrains
 
 pytestmark = pytest.mark.usefixtures("rgb")
@@ -140,6 +141,68 @@ def test_where_it_was_stopped_does_not_matter(monkeypatch, tmp_path, sensor):
         rest = measure(geometry, incident, sensor=sensor, before=Measurement.load(tmp_path / f"{k}.npz"))
         assert np.array_equal(rest.paths, once.paths) and np.array_equal(rest.energy, once.energy)
     assert np.array_equal(measure(geometry, incident, before=once, **few).paths, 2 * once.paths)
+
+
+def test_checkpoints_in_a_file_go_on_and_leave_the_result_as_it_is(monkeypatch, tmp_path):
+    """A description may hold tuples, and a file has none. What is saved must not fix the values of what is to come."""
+    monkeypatch.setattr(sys.modules["asperity.goniophotometer.measure"], "BATCH", 1000)
+    geometry, batches = RandomWalk((0.8, 0.5, 0.2)), []
+    few = {"paths": 5000, "tiles": 2, "interval": 0, "checkpoint": tmp_path / "part.npz"}
+    once = measure(geometry, [(30, 0)], **few)
+    assert np.array_equal(once.albedo.value, once.copy().albedo.value)
+    part = measure(geometry, [(30, 0)], stop=lambda: batches.append(1) or len(batches) == 3, **few)
+    saved = Measurement.load(tmp_path / "part.npz")
+    assert 0 < saved.total_paths < part.total_paths < once.total_paths and part.missing.sum() == 5000 - 3000
+    rest = measure(geometry, [(30, 0)], before=saved)
+    assert np.array_equal(rest.energy, once.energy)
+
+
+def test_a_checkpoint_that_fails_is_only_a_warning(tmp_path):
+    few = {"paths": 100, "tiles": 2, "interval": 0}
+    with pytest.warns(UserWarning, match="no checkpoint: cannot write .*none/part.npz: No such file"):
+        measured = measure(RandomWalk(), [(30, 0)], checkpoint=tmp_path / "none" / "part.npz", **few)
+    assert measured.finished
+
+
+def test_only_the_same_tiles_go_on():
+    before = measure(RandomWalk(), [(30, 0)], paths=100, tiles=2, seed=1)
+    for option in ({"tiles": 3}, {"seed": 0}):
+        with pytest.raises(ParameterError, match=f"{next(iter(option))} = .*: before has .*merge"):
+            measure(RandomWalk(), [(30, 0)], before=before, **option)
+
+
+def test_what_a_file_cannot_keep_is_refused_at_once():
+    with pytest.raises(ParameterError, match=r"note: a measurement cannot keep its description: .*ndarray"):
+        measure(RandomWalk(), [(30, 0)], about={"note": np.zeros(3)}, **FEW)
+
+
+@pytest.mark.parametrize(
+    ("options", "sensor"),
+    [
+        ({}, Hemisphere()),
+        ({"cells": (4, 8)}, Hemisphere(4, 8)),
+        ({"name": "retro"}, Window("retro")),
+        ({"name": "normal", "radius": 5, "cells": [6]}, Window("normal", 5, 6)),
+        ({"towards": [(30, 0)]}, Points(((30, 0),))),
+    ],
+)
+def test_sensors_by_name(options, sensor):
+    assert by_name(**options) == sensor
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"name": "retor"}, "sensor 'retor'. Did you mean 'retro'"),
+        ({"name": "points"}, "towards: "),
+        ({"cells": (4,)}, "cells: sensor hemisphere takes ROWSxCOLUMNS"),
+        ({"name": "mirror", "cells": (4, 8)}, "cells: sensor mirror takes N"),
+        ({"radius": 5}, "radius: makes no sense with sensor hemisphere"),
+    ],
+)
+def test_no_sensor_by_that_name(options, complaint):
+    with pytest.raises(AsperityError, match=complaint):
+        by_name(**options)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ import pytest
 
 import asperity  # noqa: F401
 from asperity.errors import UnreadableFileError
-from asperity.goniophotometer import Measurement, Window, measure
+from asperity.goniophotometer import HeightField, Measurement, Window, measure
+from asperity.goniophotometer.measurement import with_error
 from asperity.models.micrograin import ExplicitGrains
 
 pytestmark = pytest.mark.usefixtures("rgb")
@@ -36,6 +37,35 @@ def test_files(tmp_path):
         assert file["values"].shape == file["errors"].shape == (2, 2, 16, 3)
         assert file["wo"].shape == (2, 16, 3) and list(file["orders"]) == [1, 2]
     assert [p.name for p in tmp_path.iterdir()] == ["grains.npz"]
+
+
+def test_where_the_light_went():
+    glass = HeightField(np.zeros((2, 2)), 1, {"type": "dielectric"})
+    measured = measure(glass, [(30, 0)], apart=2, **FEW)
+    assert list(measured.balance) == ["albedo", "order 1", "order 2 and more", "transmitted"]
+    assert sum(measured.balance[name].value for name in ("albedo", "transmitted")) == pytest.approx(1)
+    assert measured.mode == "rgb" and not measured.colourful and measured.channels == ["R", "G", "B"]
+    mirrors = measure(ExplicitGrains(0.5, base={"type": "conductor"}), [(30, 0)], orders=1, **FEW)
+    assert list(mirrors.balance) == ["albedo", "cut"]
+
+
+@pytest.mark.parametrize(("grains", "few"), [(16, True), (2**14, False)])
+def test_tiles_of_few_grains_differ_by_more_than_noise(grains, few):
+    """In all of them together: 128 grains leave 9 % of doubt, and 2^16 paths 0.2 %."""
+    assert measure(ExplicitGrains(0.5, grains=grains), [(30, 0)], orders=1, **FEW).wants_tiles is few
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.123456, 0.00123, "0.1235 ± 0.0012"),
+        (0.5, 0.0, "0.5 ± 0"),
+        (0.5, np.nan, "0.5 ± ?"),
+        (np.nan, 0.1, "not measured"),
+    ],
+)
+def test_digits_follow_the_error(value, error, text):
+    assert with_error(value, error) == text
 
 
 @pytest.mark.parametrize("content", [b"", b"no archive", None])

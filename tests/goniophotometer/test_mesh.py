@@ -9,10 +9,10 @@ import re
 import mitsuba as mi
 import numpy as np
 import pytest
-from surfaces import COARSE, FLAT, WHITE, agrees, closed, grid, run, waves, write
+from surfaces import COARSE, FLAT, WHITE, agrees, closed, mesh_file, run, waves, write
 
 from asperity.errors import AsperityError, UnreadableFileError
-from asperity.goniophotometer.mesh import HeightField, Mesh
+from asperity.goniophotometer.mesh import HeightField, Mesh, from_file
 from asperity.lab import evaluate
 
 MIRROR = {"type": "conductor", "material": "none"}
@@ -65,9 +65,9 @@ def test_no_light_slips_through_edges(rgb):
 def test_a_mesh_equals_its_height_field(rgb, tmp_path, ending, periodic):
     heights = waves(24) if periodic == "wrap" else waves(24)[:15, :9]
     spacing = 1 / 24 if periodic == "wrap" else (1 / 8, 1 / 14)
-    path = grid(tmp_path / f"waves{ending}", closed(heights) if periodic == "wrap" else heights, (3, -2, 7))
+    path = mesh_file(tmp_path / f"waves{ending}", closed(heights) if periodic == "wrap" else heights, (3, -2, 7))
     mesh, field = Mesh(path, WHITE, periodic), HeightField(heights, spacing, WHITE, periodic)
-    assert mesh.tile(None)[1:5] == pytest.approx(field.tile(None)[1:5], rel=1e-5)
+    assert mesh.piece(None)[1:5] == pytest.approx(field.piece(None)[1:5], rel=1e-5)
     one, other = run(mesh, paths=2**17, orders=1), run(field, paths=2**17, orders=1, seed=1)
     value, error = one.summed.value - other.summed.value, np.hypot(one.summed.error, other.summed.error)
     assert one.total_albedo.value[0, 0] < 0.9 and agrees(value[..., 0], 0, error[..., 0])
@@ -78,7 +78,7 @@ def test_mirrored_copies_look_up(rgb, sign):
     """Saw teeth that light comes down on from +x: mirrored, both their slopes are there, and φ is no matter."""
     teeth = HeightField(sign * np.array([[0, 1.0], [0, 1.0]]), 1, {"type": "diffuse"}, "mirror")
     left, right = run(teeth, (60, 0), (60, 180), orders=1).total_albedo.value[:, 0]
-    assert teeth.tile(None)[1:3] == (1, 1) and left == pytest.approx(right, abs=0.01) and left > 0.2
+    assert teeth.piece(None)[1:3] == (1, 1) and left == pytest.approx(right, abs=0.01) and left > 0.2
 
 
 def test_overhangs_are_counted_and_traced(rgb, tmp_path):
@@ -93,27 +93,43 @@ def test_overhangs_are_counted_and_traced(rgb, tmp_path):
 
 
 def test_a_tile_is_built_once_and_described_in_plain_words(rgb, tmp_path):
-    field, mesh = HeightField(waves(), 1, WHITE), Mesh(grid(tmp_path / "flat.ply", FLAT))
+    field, mesh = HeightField(waves(), 1, WHITE), Mesh(mesh_file(tmp_path / "flat.ply", FLAT))
     for geometry in (field, mesh):
-        assert geometry.tile(None) is geometry.tile(np.random.default_rng(0))
+        assert geometry.piece(None) is geometry.piece(np.random.default_rng(0))
         assert json.loads(json.dumps(geometry.description)) == geometry.description
     assert HeightField(waves(), 1, WHITE).description == field.description
     assert HeightField(waves() + 1e-9, 1, WHITE).description != field.description
     before = mesh.description
-    grid(tmp_path / "flat.ply", FLAT, (0, 0, 1))
+    mesh_file(tmp_path / "flat.ply", FLAT, (0, 0, 1))
     assert Mesh(tmp_path / "flat.ply").description["sha256"] != before["sha256"]
 
 
 @pytest.mark.parametrize("copied", [lambda geometry: pickle.loads(pickle.dumps(geometry)), copy.copy, copy.deepcopy])
 def test_geometries_travel(rgb, tmp_path, copied):
     """After use, too: what is made again is left behind. A copy is as read-only as its original."""
-    mesh = Mesh(grid(tmp_path / "waves.ply", closed(waves(8))), WHITE)
+    mesh = Mesh(mesh_file(tmp_path / "waves.ply", closed(waves(8))), WHITE)
     for geometry in (mesh, HeightField(waves(8), 1 / 8, WHITE, level=True)):
         before = run(geometry, paths=2**10)
         twin = copied(geometry)
         assert twin.description == geometry.description and vars(twin).keys() < vars(geometry).keys()
         assert np.array_equal(run(twin, paths=2**10).energy, before.energy)
     assert not twin.heights.flags.writeable
+
+
+def test_surfaces_by_their_kind(rgb, tmp_path):
+    mesh_file(tmp_path / "flat.ply", FLAT)
+    np.save(tmp_path / "flat.npy", FLAT)
+    mesh = from_file("mesh", tmp_path / "flat.ply", periodic="mirror", spacing=None)
+    field = from_file("heightfield", tmp_path / "flat.npy", spacing=0.5, level=True)
+    assert isinstance(mesh, Mesh) and mesh.periodic == "mirror" and mesh.bsdf == {"type": "diffuse"}
+    assert isinstance(field, HeightField) and field.spacing == (0.5, 0.5) and field.level
+    for kind, options, words in (
+        ("mesh", {"spacing": 1}, "spacing: makes no sense with a mesh"),
+        ("heightfield", {}, "spacing: a height field needs"),
+        ("meshes", {}, "Did you mean 'mesh'"),
+    ):
+        with pytest.raises(AsperityError, match=words):
+            from_file(kind, tmp_path / "flat.ply", **options)
 
 
 def moved(k, point):

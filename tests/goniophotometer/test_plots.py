@@ -27,9 +27,9 @@ def labels(figure):
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.kind)
 def test_any_model_is_drawn_beside_what_was_measured(rgb, sensor):
     """By its own name, whether or not the measurement says that it was of a model."""
-    assert "model: diffuse" in labels(plots.draw(seen(sensor), GREY))
-    assert "model: diffuse" in labels(plots.draw(seen(sensor, model={"type": "micrograin"}), GREY))
-    assert not any("model" in label for label in labels(plots.draw(seen(sensor))))
+    assert "model: diffuse" in labels(plots.figure(seen(sensor), GREY))
+    assert "model: diffuse" in labels(plots.figure(seen(sensor, model={"type": "micrograin"}), GREY))
+    assert not any("model" in label for label in labels(plots.figure(seen(sensor))))
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_spectral", "llvm_ad_mono"])
@@ -37,4 +37,4 @@ def test_a_model_needs_the_channels_that_were_measured(rgb, variant):
     measured = seen()
     mi.set_variant(variant)
     with pytest.raises(ParameterError, match=f"variant {variant}.*R, G, B were measured"):
-        plots.draw(measured, GREY)
+        plots.figure(measured, GREY)

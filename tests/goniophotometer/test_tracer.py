@@ -4,7 +4,7 @@ import asperity  # noqa: F401  isort: skip
 import mitsuba as mi
 import numpy as np
 import pytest
-from surfaces import FLAT, WHITE, agrees, closed, grid, run, waves
+from surfaces import FLAT, WHITE, agrees, closed, mesh_file, run, waves
 
 from asperity.goniophotometer import HeightField, Mesh, Points, Tile, Window, measure
 from asperity.lab import evaluate
@@ -18,7 +18,7 @@ SURFACES = {
     "pane": lambda folder: HeightField(FLAT, 1, GLASS),
     "wrapped": lambda folder: HeightField(waves(), 1 / 48, GLASS),
     "mirrored": lambda folder: HeightField(waves(), 1 / 48, GLASS, "mirror"),
-    "mesh": lambda folder: Mesh(grid(folder / "waves.ply", closed(waves(24))), GLASS),
+    "mesh": lambda folder: Mesh(mesh_file(folder / "waves.ply", closed(waves(24))), GLASS),
     "mirrors on glass": lambda folder: ExplicitGrains(0.5, 1.5, 0.7, base=GLASS),
     "mirrors on thin glass": lambda folder: ExplicitGrains(0.5, base={"type": "thindielectric"}),
 }
@@ -60,7 +60,7 @@ class Varnish:
     def description(self):
         return {"type": "varnish"}
 
-    def tile(self, rng):
+    def piece(self, rng):
         sides = {
             "glass": {"type": "rectangle", "bsdf": ROUGH},
             "paint": {"type": "rectangle", "bsdf": WHITE, "to_world": mi.ScalarTransform4f().translate([0, 0, -0.1])},

@@ -87,7 +87,7 @@ def test_catches_a_fault_by_the_checks_it_concerns(name, tmp_path):
     assert failed(results) == BROKEN[name]
     for result in results:
         if result.passed is False:
-            pictures.draw(result, tmp_path / "failure.png")
+            pictures.write(result, tmp_path / "failure.png")
             assert (tmp_path / "failure.png").read_bytes().startswith(b"\x89PNG")
 
 

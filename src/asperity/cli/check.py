@@ -56,7 +56,7 @@ def check(
         )
     report(results)
     failures = [result for result in results if result.passed is False]
-    draw(failures, name, pictures)
+    write_pictures(failures, name, pictures)
     raise typer.Exit(1 if failures else 0)
 
 
@@ -69,7 +69,7 @@ def report(results: list[Any]) -> None:
     console.stdout().print(table)
 
 
-def draw(failures: list[Any], name: str, folder: Path) -> None:
+def write_pictures(failures: list[Any], name: str, folder: Path) -> None:
     """Write a picture of each failure that measured something, and print where."""
     from asperity.lab import pictures
 
@@ -77,5 +77,5 @@ def draw(failures: list[Any], name: str, folder: Path) -> None:
         if result.evidence is not None:
             folder.mkdir(parents=True, exist_ok=True)
             with output.files(folder, Path(f"{name}-{result.name}.png"), (".png",)) as [path], atomically(path) as part:
-                pictures.draw(result, part)
+                pictures.write(result, part)
             typer.echo(path)

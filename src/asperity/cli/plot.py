@@ -29,9 +29,8 @@ def plot(
         measured = Measurement.load(file)
         description = measured.about.get("model") if model else None
         if description is not None:
-            first = measured.about["channels"][0]
-            variants.choose("llvm_ad_spectral" if first.endswith("nm") else "llvm_ad_mono" if first == "Y" else None)
-        figure = plots.draw(measured, description)
+            variants.choose(None if measured.mode == "rgb" else f"llvm_ad_{measured.mode}")
+        figure = plots.figure(measured, description)
         with atomically(out) as part:
             figure.savefig(part)
     typer.echo(out)

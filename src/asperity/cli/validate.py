@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,13 +9,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from asperity import __version__
-from asperity.errors import UnknownNameError
-
 from . import console, output, passes, variants
 
-QUICK, FULL = (4e5, 16), (4e6, 32)
-"""Paths per direction, and tiles."""
 VERDICT = {True: ("passed", "green"), False: ("failed", "bold red"), None: ("", "dim")}
 
 
@@ -36,47 +29,21 @@ def validate(
     """
     with console.status("loading"):
         variants.choose(variant)
-        from asperity.validation import PAPERS, report
+        from asperity import validation
 
-    if model not in PAPERS:
-        raise UnknownNameError("model with a validation", model, PAPERS)
+        validation.paper(model)
     folder = ctx.with_resource(output.folder(out, Path(f"asperity-validate-{model}"), force=force))
-    folder.mkdir(exist_ok=True)  # now, not after minutes of tracing
-    start, interrupted = time.perf_counter(), ctx.with_resource(passes.interruptible())
-    paths, tiles = QUICK if quick else FULL
-    found: list[Any] = []
+    interrupted = ctx.with_resource(passes.interruptible())
+    with console.status("measuring") as status:
 
-    def write(early: str, new: int = 0) -> Path:
-        """Write what there is; only the last sections, if they are ``new``, have pictures that are not there yet."""
-        preface = (
-            f"{early}Made by `asperity validate {model}{' --quick' if quick else ''}`, asperity {__version__}, in "
-            f"{time.perf_counter() - start:.0f} s: {paths:g} paths per direction (some sections take a quarter or "
-            f"eight times that) in {tiles} groups, seed {seed}. Each group has a tile of its own, where the surface is "
-            "random. Errors are standard errors over the groups. The bounds are such that a right model fails a report "
-            "with a probability of 1 %."
-        )
-        return report.write(f"`{model}` against its microgeometry", preface, found, folder, len(found) - new)
-
-    def tick(*_: Any) -> None:
-        if interrupted:
-            raise StoppedError
-
-    with console.status("measuring") as status, suppress(StoppedError):
-        for section in PAPERS[model](report.Effort(paths, tiles, seed, tick)):
-            found.append(section)
-            write("Not finished. ", new=1)
+        def tell(section: Any) -> None:
             status.update(f"measured: {section.title}")
             console.log(f"measured: {section.title}")
-            tick()
-    early = "Stopped early. " if interrupted else ""
-    path = write(early)
-    console.stdout().print(tabulated(found))
-    typer.echo(f"{early}{path}: {time.perf_counter() - start:.0f} s")
-    raise typer.Exit(0 if report.passed(found) and not interrupted else 1)
 
-
-class StoppedError(Exception):
-    """Somebody wants to stop; what is being measured is left out."""
+        report = validation.validate(model, folder, quick=quick, seed=seed, stop=lambda: bool(interrupted), done=tell)
+    console.stdout().print(tabulated(report.sections))
+    typer.echo(f"{'' if report.finished else 'Stopped early. '}{report.path}: {report.seconds:.0f} s")
+    raise typer.Exit(0 if report.passed else 1)
 
 
 def tabulated(sections: list[Any]) -> Table:

@@ -9,6 +9,7 @@ from .measurement import Measurement as Measurement
 from .measurement import merge as merge
 from .mesh import HeightField as HeightField
 from .mesh import Mesh as Mesh
+from .mesh import from_file as from_file
 from .microgeometry import Microgeometry as Microgeometry
 from .sensors import Hemisphere as Hemisphere
 from .sensors import Points as Points

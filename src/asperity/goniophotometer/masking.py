@@ -78,8 +78,7 @@ def measure_masking(
     check_effort(wi, points, tiles, seed)
     if wo is not None and len(wo) != len(wi):
         raise ParameterError(f"wo: expected as many directions as wi has ({len(wi)}).")
-    for angles in pairs:
-        check_angles(angles)
+    check_angles(wo or ())
     if overhangs := getattr(geometry, "overhangs", 0):
         raise ParameterError(
             f"masking needs a height field, and {overhangs} faces overhang: some of it is out of sight."
@@ -88,7 +87,7 @@ def measure_masking(
     batch = max(BATCH // len(pairs), 1) * len(pairs)  # lanes take the pairs in turn
     counts, parts = [], []
     for number in range(tiles):
-        tile = geometry.tile(np.random.default_rng([seed, number]))
+        tile = geometry.piece(np.random.default_rng([seed, number]))
         if not isinstance(tile, Tile):
             raise ParameterError(f"masking needs shapes that one can look at, not {type(tile).__name__}.")
         parts = list(tile.facets())

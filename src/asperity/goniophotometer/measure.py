@@ -1,20 +1,22 @@
-"""Runs the instrument: tiles, directions and batches of paths."""
+"""Runs the instrument: pieces, directions and batches of paths."""
 
 from __future__ import annotations
 
+import json
 import os
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from ..errors import ParameterError
-from .measurement import Measurement, check_alike
+from .measurement import Measurement, check_alike, check_tiles
 from .microgeometry import Microgeometry, Piece
 from .sensors import Hemisphere, Points, Sensor, check_angles
 from .tile import VISIBLE, Tile
@@ -39,14 +41,14 @@ def measure(
     orders: int | None = None,
     apart: int = 1,
     paths: float = PATHS,
-    tiles: int = TILES,
-    seed: int = 0,
+    tiles: int | None = None,
+    seed: int | None = None,
     wavelengths: Sequence[float] | None = None,
     before: Measurement | None = None,
     about: dict[str, Any] | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
     stop: Callable[[], bool] = lambda: False,
-    checkpoint: Callable[[Measurement], None] | None = None,
+    checkpoint: str | Path | Callable[[Measurement], None] | None = None,
     interval: float = INTERVAL,
 ) -> Measurement:
     """Measure the BSDF of a microgeometry.
@@ -58,93 +60,153 @@ def measure(
     orders : the highest order of scattering that is followed; all of them if None
     apart : how many orders are counted apart; the last one takes all that follow
     paths : per direction, shared among the tiles
-    tiles : how many tiles are drawn; the standard error comes from their differences, so at least 2
-    seed : the same seed gives the same result, bit for bit, on any machine of the same kind
+    tiles : how many pieces of the surface are drawn, 32 if None; the standard error comes from their differences, so at
+        least 2
+    seed : 0 if None; the same seed gives the same result, bit for bit, on any machine of the same kind
     wavelengths : in nm, as many as the spectral variant has channels
     before : a measurement of the same thing. If it was stopped, it is taken up to what it was asked for, whatever
         ``paths`` is: the result is that of one that was not stopped, bit for bit. If it is finished, its tiles get as
         many ``paths`` more. (Other seeds, more tiles: see `merge`.)
-    about : what else to note in the result
+    about : what else to note in the result: numbers, words, lists and dictionaries
     progress(done, total) : called after each batch of paths
     stop() : asked after each batch; True ends the measurement with what there is
-    checkpoint(measurement) : called with what there is, to save it, say, every ``interval`` seconds, and not so often
-        if it takes more than a tenth of that
+    checkpoint : a file, .npz, to save what there is to, every ``interval`` seconds, and not so often if that takes more
+        than a tenth of the time; if it cannot be written, there is a warning. Or what to call with a `Measurement`
 
     Raises ParameterError for what cannot be measured, or not with the memory that there is.
     """
-    sensor = sensor or Hemisphere()
-    check_angles(incident)
     check_effort(incident, paths, tiles, seed)
-    for name, order in (("orders", orders), ("apart", apart)):
-        if order is not None:
-            _check_whole(name, order, 1)
-    settings = Settings(orders or ENDLESS, min(apart, orders or apart), _wavelengths(wavelengths))
-    result = _empty(geometry, incident, sensor, settings, tiles, seed, about or {})
-    if before is not None:
-        check_alike(before, result, "continuing")
-        result = before.copy()
-    # Each path of a batch aims at one of the points: every point must get as many.
-    share = sensor.cells if isinstance(sensor, Points) else 1
-    batch = max(BATCH // share, 1) * share
+    sensor, settings = sensor or Hemisphere(), _settings(orders, apart, wavelengths)
+    about = _described(geometry, sensor, settings, about or {})
+    if before is None:
+        result = _empty(about, incident, sensor.cells, TILES if tiles is None else tiles, 0 if seed is None else seed)
+    else:
+        result = _taken_up(before, about, incident, tiles, seed)
     if result.finished:
-        quota = -(-int(paths) // (len(result.labels) * share)) * share
-        result = replace(result, goal=result.paths.max(axis=1) + quota)
-    missing = np.maximum(result.goal[:, None] - result.paths, 0)
-    done, total, due = 0, int(missing.sum()), time.monotonic() + interval
-    while done < total:
-        for row, (tile_seed, number) in enumerate(result.labels):
-            if np.all(result.paths[row] >= result.goal[row]):
-                continue
-            tile = geometry.tile(np.random.default_rng([tile_seed, number]))
-            if isinstance(sensor, Points):
-                _check_facets(tile)
-            if done == 0:
-                _warn_of_repetition(tile, result.incident)
-            for k, wi in enumerate(result.wi):
-                # Batches begin at the same paths, and have the same numbers, wherever the measurement was stopped.
-                lanes = min(batch, int(result.goal[row] - result.paths[row, k]))
-                if lanes <= 0:
-                    continue
-                stream = np.random.SeedSequence([int(tile_seed), int(number), k, int(result.paths[row, k])])
-                result.energy[row, k] += trace(tile, sensor, wi, settings, stream, lanes)
-                result.paths[row, k] += lanes
-                done += lanes
-                progress(done, total)
-                if stop():
-                    return result
-                if checkpoint is not None and time.monotonic() >= due:
-                    due = _saved(checkpoint, result) + interval
+        result = _prolonged(result, paths)
+    done, total, save = 0, int(result.missing.sum()), _Checkpoints(checkpoint, interval)
+    for batch in _batches(geometry, result):
+        if done == 0:
+            _warn_of_repetition(batch.piece, result.incident)
+        wi, counted = result.wi[batch.direction], (batch.tile, batch.direction)
+        result.energy[counted] += trace(batch.piece, sensor, wi, settings, batch.seed, batch.paths)
+        result.paths[counted] += batch.paths
+        done += batch.paths
+        progress(done, total)
+        if stop():
+            break
+        save.if_due(result)
     return result
 
 
-def _saved(checkpoint: Callable[[Measurement], None], result: Measurement) -> float:
-    """Hand over what there is; return the time from which to count to the next."""
-    start = time.monotonic()
-    checkpoint(result.copy())
-    end = time.monotonic()
-    return end + 9 * (end - start)
+def _settings(orders: int | None, apart: int, wavelengths: Sequence[float] | None) -> Settings:
+    """How far to follow paths, and what to tell apart."""
+    _check_whole("orders", orders, 1)
+    _check_whole("apart", apart, 1)
+    return Settings(orders or ENDLESS, min(apart, orders or apart), _wavelengths(wavelengths))
 
 
-def _empty(geometry, incident, sensor, settings, tiles, seed, about) -> Measurement:
+def _described(geometry: Microgeometry, sensor: Sensor, settings: Settings, others: dict[str, Any]) -> dict[str, Any]:
+    """What a measurement is about, as it comes back from a file: lists for tuples, which continuing would tell apart.
+
+    Raises ParameterError for what a file cannot keep: now, and not after the tracing.
+    """
+    channels = [f"{w:g} nm" for w in settings.wavelengths] or list("RGB" if mi.is_rgb else "Y")
+    about = others | {
+        "geometry": geometry.description,
+        "sensor": sensor.describe(),
+        "limit": settings.limit,
+        "orders": settings.orders,
+        "channels": channels,
+    }
+    for name, description in about.items():
+        try:
+            about[name] = json.loads(json.dumps(description))
+        except TypeError as error:
+            raise ParameterError(f"{name}: a measurement cannot keep its description: {error}.") from error
+    return about
+
+
+def _empty(about: dict[str, Any], incident: Sequence[Any], cells: int, tiles: int, seed: int) -> Measurement:
     """A measurement of no paths."""
-    channels = dr.size_v(mi.UnpolarizedSpectrum)
-    names = [f"{w:g} nm" for w in settings.wavelengths] or list("RGB" if channels == 3 else "Y")
-    shape = (tiles, len(incident), settings.orders, sensor.cells + EXTRA, channels)
+    shape = (tiles, len(incident), about["orders"], cells + EXTRA, len(about["channels"]))
     _check_memory(*shape)
-    return Measurement(
-        about
-        | {
-            "geometry": geometry.description,
-            "sensor": sensor.describe(),
-            "limit": settings.limit,
-            "orders": settings.orders,
-            "channels": names,
-        },
-        np.array(incident, dtype=float),
-        np.stack([np.full(tiles, seed), np.arange(tiles)], axis=1),
-        np.zeros(shape[:2], dtype=np.int64),
-        np.zeros(shape, dtype=np.uint64),
-    )
+    labels = np.stack([np.full(tiles, seed), np.arange(tiles)], axis=1)
+    paths, energy = np.zeros(shape[:2], dtype=np.int64), np.zeros(shape, dtype=np.uint64)
+    return Measurement(about, np.array(incident, dtype=float), labels, paths, energy)
+
+
+def _taken_up(
+    before: Measurement, about: dict[str, Any], incident: Sequence[Any], tiles: int | None, seed: int | None
+) -> Measurement:
+    """The measurement ``before``, to add to, if it is of what is asked for."""
+    check_tiles(before, tiles, seed)
+    check_alike(before, replace(before, about=about, incident=np.array(incident, dtype=float)), "continuing")
+    _check_memory(*before.energy.shape)
+    return before.copy()
+
+
+def _prolonged(result: Measurement, paths: float) -> Measurement:
+    """The measurement with a goal of so many paths more per direction."""
+    share = _share(result.sensor)
+    quota = -(-int(paths) // (len(result.labels) * share)) * share
+    return replace(result, goal=result.paths.max(axis=1) + quota)
+
+
+class _Batch(NamedTuple):
+    """Some paths, from one of the directions of incidence through one of the pieces."""
+
+    piece: Piece
+    tile: int
+    direction: int
+    paths: int
+    seed: np.random.SeedSequence
+
+
+def _batches(geometry: Microgeometry, result: Measurement) -> Iterator[_Batch]:
+    """What ``result`` misses, for the caller to add to it: a batch for each direction of each tile, again and again.
+
+    Batches begin at the same paths, and have the same numbers, wherever the measurement was stopped.
+    """
+    share = _share(result.sensor)
+    most = max(BATCH // share, 1) * share
+    while not result.finished:
+        for row in map(int, np.flatnonzero(result.missing.any(axis=1))):
+            label = tuple(map(int, result.labels[row]))
+            piece = geometry.piece(np.random.default_rng(label))
+            if isinstance(result.sensor, Points):
+                _check_facets(piece)
+            for k in map(int, np.flatnonzero(result.missing[row])):
+                seed = np.random.SeedSequence([*label, k, int(result.paths[row, k])])
+                yield _Batch(piece, row, k, min(most, int(result.missing[row, k])), seed)
+
+
+def _share(sensor: Sensor) -> int:
+    """What the number of paths must be a multiple of: each aims at one of the points, and every point gets as many."""
+    return sensor.cells if isinstance(sensor, Points) else 1
+
+
+class _Checkpoints:
+    """Saves what there is now and then."""
+
+    def __init__(self, to: str | Path | Callable[[Measurement], None] | None, interval: float):
+        self.to, self.interval, self.due = to, interval, time.monotonic() + interval
+
+    def if_due(self, result: Measurement) -> None:
+        """Save it if it is time to, and set the next time."""
+        start = time.monotonic()
+        if self.to is None or start < self.due:
+            return
+        part = result.copy()  # which remembers values that ``result`` is yet to change
+        if callable(self.to):
+            self.to(part)
+        else:
+            try:
+                part.save(self.to)
+            except OSError as error:  # the next time may be luckier
+                warnings.warn(f"no checkpoint: cannot write {self.to}: {error.strerror}.", stacklevel=3)
+        end = time.monotonic()
+        self.due = end + 9 * (end - start) + self.interval
 
 
 def _check_memory(tiles: int, directions: int, orders: int, columns: int, channels: int) -> None:
@@ -162,10 +224,11 @@ def _check_memory(tiles: int, directions: int, orders: int, columns: int, channe
         )
 
 
-def check_effort(incident: Sequence[Any], paths: float, tiles: int, seed: int) -> None:
-    """Raise ParameterError for numbers with which nothing can be measured."""
+def check_effort(incident: Sequence[Any], paths: float, tiles: int | None, seed: int | None) -> None:
+    """Raise ParameterError for numbers with which nothing can be measured; None is the default."""
     if not incident:
         raise ParameterError("theta: expected at least one direction of incidence.")
+    check_angles(incident)
     _check_whole("tiles", tiles, 2)
     _check_whole("seed", seed, 0)
     if not 1 <= paths <= 1e13:  # nor NaN
@@ -173,7 +236,7 @@ def check_effort(incident: Sequence[Any], paths: float, tiles: int, seed: int) -
 
 
 def _check_whole(name: str, value: Any, least: int) -> None:
-    if not (isinstance(value, int) and least <= value < 2**63):
+    if value is not None and not (isinstance(value, int) and least <= value < 2**63):
         raise ParameterError(f"{name} = {value!r}: expected a whole number in [{least}, 2^63).")
 
 

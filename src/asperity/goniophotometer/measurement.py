@@ -42,6 +42,16 @@ def estimate(sums: np.ndarray, paths: np.ndarray) -> Estimate:
         return Estimate(mean, np.sqrt(spread) / total)
 
 
+def with_error(value: float, error: float) -> str:
+    """A value with as many digits as its standard error, which gets two, deserves: 0.3670 ± 0.0044."""
+    if not np.isfinite(value):
+        return "not measured"
+    if not (np.isfinite(error) and error > 0):
+        return f"{value:.4g} ± {'0' if error == 0 else '?'}"
+    digits = int(np.clip(1 - np.floor(np.log10(error)), 0, 6))
+    return f"{value:.{digits}f} ± {error:.{digits}f}"
+
+
 @dataclass(frozen=True)
 class Measurement:
     """Light counted by tile, direction of incidence, order of scattering, cell and channel.
@@ -72,10 +82,24 @@ class Measurement:
         return sensors.directions(self.incident)
 
     @property
+    def channels(self) -> list[str]:
+        """Names of the channels: R, G and B; Y; or wavelengths in nm."""
+        return self.about["channels"]
+
+    @property
     def wavelengths(self) -> list[float] | None:
         """In nm, of the channels; None in RGB."""
-        names = self.about["channels"]
-        return [float(name.split()[0]) for name in names] if "nm" in names[0] else None
+        return [float(name.split()[0]) for name in self.channels] if "nm" in self.channels[0] else None
+
+    @property
+    def mode(self) -> str:
+        """The kind of Mitsuba's variants that have these channels: ``rgb``, ``mono`` or ``spectral``."""
+        return "spectral" if self.wavelengths else "mono" if len(self.channels) == 1 else "rgb"
+
+    @cached_property
+    def colourful(self) -> bool:
+        """Whether the channels hold different values."""
+        return bool(np.ptp(self.energy, axis=-1).any())
 
     @property
     def orders(self) -> int:
@@ -88,9 +112,14 @@ class Measurement:
         return int(self.paths.sum())
 
     @property
+    def missing(self) -> np.ndarray:
+        """Paths that were asked for and not traced yet: (tiles, directions)."""
+        return np.maximum(self.goal[:, None] - self.paths, 0)
+
+    @property
     def finished(self) -> bool:
         """Whether all paths were traced that were asked for."""
-        return bool(np.all(self.paths >= self.goal[:, None]))
+        return not self.missing.any()
 
     def copy(self) -> Measurement:
         """One to add to."""
@@ -125,6 +154,35 @@ class Measurement:
     def cut(self) -> Estimate:
         """Share of the light that was not followed beyond the limit of orders: (directions, channels)."""
         return self._estimate(self._beside(CUT).sum(axis=2))
+
+    @property
+    def order_names(self) -> list[str]:
+        """What the orders that were counted apart are called; the last one may hold all that follow."""
+        more = " and more" if self.about["limit"] > self.orders else ""
+        return [f"order {n}" for n in range(1, self.orders)] + [f"order {self.orders}{more}"]
+
+    @property
+    def balance(self) -> dict[str, Estimate]:
+        """Where the light went, by name, (directions, channels) each: ``albedo``, the total one, and its orders.
+
+        With them ``transmitted`` and ``cut``, if that happened to more than a millionth of the light.
+        """
+        found = {"albedo": self.total_albedo}
+        if self.orders > 1:
+            found |= {name: Estimate(*(x[:, n] for x in self.albedo)) for n, name in enumerate(self.order_names)}
+        lost = {"transmitted": self.transmitted, "cut": self.cut}
+        return found | {name: part for name, part in lost.items() if np.any(part.value > 1e-6)}
+
+    @property
+    def wants_tiles(self) -> bool:
+        """Whether the errors are mostly the surface's own randomness, which more tiles lower, and more paths do not.
+
+        That is if all errors of the albedo are above zero, and one is four times what so many paths would make it if
+        each were reflected, or not, with its whole weight.
+        """
+        value, error = self.total_albedo
+        noise = np.sqrt(np.clip(value * (1 - value), 0, None) / np.maximum(self.paths.sum(axis=0), 1)[:, None])
+        return bool(np.any(error > 4 * noise) and np.all(noise > 0))
 
     @property
     def _cells(self) -> np.ndarray:
@@ -208,6 +266,16 @@ def check_alike(one: Measurement, other: Measurement, doing: str) -> None:
         raise ParameterError(
             f"{doing}: the directions of incidence differ: {one.incident.tolist()} and {other.incident.tolist()}."
         )
+
+
+def check_tiles(one: Measurement, tiles: int | None, seed: int | None, name: str = "before") -> None:
+    """Raise ParameterError if a measurement, called ``name``, has other tiles than are asked for; None is anything."""
+    for option, value, had in (("tiles", tiles, {len(one.labels)}), ("seed", seed, set(one.labels[:, 0]))):
+        if value is not None and {value} != had:
+            raise ParameterError(
+                f"{option} = {value}: {name} has {', '.join(map(str, sorted(had)))}. "
+                "Measure other tiles into a file of their own, and merge both by `asperity merge`."
+            )
 
 
 def merge(measurements: Sequence[Measurement]) -> Measurement:

@@ -16,7 +16,7 @@ from .tile import opaque
 
 
 @dataclass(frozen=True)
-class HalfSpace:
+class SparseMedium:
     """A piece of it; ``particle`` scatters like a BSDF, in a frame whose z is the direction of flight."""
 
     particle: Any

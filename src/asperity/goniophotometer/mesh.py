@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from .. import loading
-from ..errors import ParameterError, UnknownNameError, readable
+from ..errors import ParameterError, UnknownNameError, readable, refuse_unused
 from . import heightmap
 from .periodic import Triangles, centred, normals
 from .tile import Tile
@@ -43,16 +45,16 @@ class Triangulated:
         """How many faces do not look up; there are none in a height field."""
         return int(np.count_nonzero(normals(*self.triangles[:2])[:, 2] <= 0))
 
-    def tile(self, rng: np.random.Generator) -> Tile:
+    def piece(self, rng: np.random.Generator) -> Tile:
         """Always the same tile, built when it is first asked for, of the variant that is then in use.
 
         It is scaled by a power of two, so that the unit of length cannot matter: its larger side is in [1, 2). Rays
         were seen to miss triangles with edges of 3e-10.
         """
-        return self._tile
+        return self._piece
 
     @cached_property
-    def _tile(self) -> Tile:
+    def _piece(self) -> Tile:
         vertices, faces, uv, (width, depth, height) = self.triangles
         if self.periodic == "mirror":
             vertices, faces, uv = _mirrored(self.triangles)
@@ -232,6 +234,25 @@ class HeightField(Triangulated):
         corner = np.arange(rows * columns).reshape(rows, columns)[:-1, :-1].reshape(-1, 1)
         here, right, back, across = corner, corner + 1, corner + columns, corner + columns + 1
         return Triangles(vertices, np.c_[here, right, across, here, across, back].reshape(-1, 3), uv, size)
+
+
+FROM_FILE: dict[str, Callable[..., Mesh | HeightField]] = {"mesh": Mesh, "heightfield": HeightField.load}
+"""What makes a surface of a file, by the kind of surface."""
+
+
+def from_file(kind: str, path: str | Path, **options: Any) -> Mesh | HeightField:
+    """The surface in a file, by its kind: ``mesh`` or ``heightfield``.
+
+    ``options`` are those of `Mesh` or `HeightField.load`; None is the default. Raises ParameterError for one that this
+    kind does not have, and UnknownNameError for another kind.
+    """
+    if kind not in FROM_FILE:
+        raise UnknownNameError("kind of surface", kind, FROM_FILE)
+    refuse_unused(options, inspect.signature(FROM_FILE[kind]).parameters, f"a {kind}")
+    given = {option: value for option, value in options.items() if value is not None}
+    if kind == "heightfield" and "spacing" not in given:
+        raise ParameterError("spacing: a height field needs the distance between its samples.")
+    return FROM_FILE[kind](path, **given)
 
 
 def _bsdf(description: dict[str, Any]) -> Any:

@@ -1,4 +1,8 @@
-"""What the goniophotometer measures: anything that says what becomes of a ray."""
+"""What the goniophotometer measures: anything that says what becomes of a ray.
+
+A `Microgeometry` is a kind of surface. Its `piece` is a `Piece` of it, which endures a variant of Mitsuba; the piece's
+`rays` are `Rays`, which endure a kernel: they let light in, and say where each ray goes next.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +39,7 @@ class Rays(Protocol):
 
 
 class Piece(Protocol):
-    """A piece of a surface: a `Tile`, or formulas."""
+    """A piece of a surface: a `Tile`, which is one period of a scene, or formulas, which need not repeat."""
 
     def rays(self, wavelengths: tuple[float, ...]) -> Rays:
         """The piece for rays of these wavelengths (nm, in spectral variants)."""
@@ -54,6 +58,6 @@ class Microgeometry(Protocol):
         """What identifies it in a file of measurements; numbers, words, lists and dictionaries only."""
         ...
 
-    def tile(self, rng: np.random.Generator) -> Piece:
+    def piece(self, rng: np.random.Generator) -> Piece:
         """A piece: one of many, if the surface is random, else always the same."""
         ...

@@ -55,7 +55,7 @@ class Line(NamedTuple):
 ALL = Line(None, None, "sum", "black", "o")
 
 
-def draw(measured: Measurement, model: dict[str, Any] | None = None) -> Figure:
+def figure(measured: Measurement, model: dict[str, Any] | None = None) -> Figure:
     """A figure: a row for each direction of incidence, and below them the albedos, if there are several.
 
     ``model`` is the description of a BSDF to draw as well; it needs a variant with the measurement's channels.
@@ -202,8 +202,8 @@ def maps(measured: Measurement, k: int, paint: Any, left: Axes, right: Axes) -> 
     """Fill two axes: the BSDF, all orders together, and its relative standard error; scales serve all directions."""
     value, error = curve(measured, k, *each(measured.sensor), ALL)
     value = np.where(value > 0, value, np.nan)  # logarithms have no place for cells without light
-    low, high = limits(measured)
-    channels = ", mean of " + ", ".join(measured.about["channels"]) if differ(measured) else ""
+    low, high = brightness_range(measured)
+    channels = ", mean of " + ", ".join(measured.channels) if measured.colourful else ""
     for axes, values, name, norm, colours in (
         (left, value, QUANTITY + channels, LogNorm(low, high), "viridis"),
         (right, 100 * error / value, ERROR, LogNorm(0.1, 100), "magma"),
@@ -225,7 +225,7 @@ def profile(measured: Measurement, k: int, bsdf: Any, bins: tuple[Any, Any], edg
                 axes.stairs(values, edges, baseline=None, **style)
     value, _ = curve(measured, k, *bins, ALL)
     if 0 < np.median(value) < value.max() / STEEP:
-        axes.set(yscale="log", ylim=(limits(measured)[0], None))
+        axes.set(yscale="log", ylim=(brightness_range(measured)[0], None))
     else:
         axes.set(ylim=(0, None))
     axes.set(ylabel=QUANTITY)
@@ -233,7 +233,7 @@ def profile(measured: Measurement, k: int, bsdf: Any, bins: tuple[Any, Any], edg
     legend(axes)
 
 
-def limits(measured: Measurement) -> tuple[float, float]:
+def brightness_range(measured: Measurement) -> tuple[float, float]:
     """Of the logarithmic scales."""
     values = measured.summed.value.mean(axis=-1)
     values = values[values > 0]
@@ -263,19 +263,11 @@ def sectors(sensor: Hemisphere, azimuth: float) -> tuple[np.ndarray, np.ndarray]
 
 def lines(measured: Measurement) -> list[Line]:
     """What to draw: the orders that were counted apart, and their sum; or, if there is one only, the channels."""
-    count, names = measured.orders, measured.about["channels"]
-    if count == 1 and differ(measured):
+    count, names = measured.orders, measured.channels
+    if count == 1 and measured.colourful:
         return [Line(0, n, name, COLOURS.get(name, BY_ORDER[n]), MARKERS[n]) for n, name in enumerate(names)]
-    labels = [f"order {n + 1}" for n in range(count)]
-    if count < measured.about["limit"]:
-        labels[-1] += " and more"
-    found = [Line(n, None, label, BY_ORDER[n % 6], MARKERS[n % 6]) for n, label in enumerate(labels)]
+    found = [Line(n, None, name, BY_ORDER[n % 6], MARKERS[n % 6]) for n, name in enumerate(measured.order_names)]
     return found if count == 1 else [*found, ALL]
-
-
-def differ(measured: Measurement) -> bool:
-    """Whether the channels hold different values."""
-    return bool(np.ptp(measured.energy, axis=-1).any())
 
 
 def model_lines(measured: Measurement, values: np.ndarray) -> list[tuple[np.ndarray, dict[str, Any]]]:
@@ -298,7 +290,7 @@ def model_means(measured: Measurement, k: int, bsdf: Any, cells: np.ndarray, wei
 
 def _check_channels(measured: Measurement) -> None:
     """Raise ParameterError if a model has other channels, in the variant in use, than what was measured."""
-    names = measured.about["channels"]
+    names = measured.channels
     spectral, count = measured.wavelengths is not None, dr.size_v(mi.UnpolarizedSpectrum)
     if (spectral, len(names)) != (mi.is_spectral, count):
         raise ParameterError(

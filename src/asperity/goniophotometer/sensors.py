@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..errors import ParameterError, UnknownNameError
+from ..errors import ParameterError, UnknownNameError, refuse_unused
+
+CENTRES = ("retro", "mirror", "normal")
+"""Of windows."""
 
 
 class Sensor:
@@ -96,8 +100,8 @@ class Window(Sensor):
 
     def __post_init__(self):
         _counts(n=self.n)
-        if self.about not in ("retro", "mirror", "normal"):
-            raise UnknownNameError("centre of a window", self.about, ("retro", "mirror", "normal"))
+        if self.about not in CENTRES:
+            raise UnknownNameError("centre of a window", self.about, CENTRES)
         if not 0 < self.radius <= 60:
             raise ParameterError(f"radius = {self.radius}: expected half a window's width, in (0, 60] degrees.")
 
@@ -177,6 +181,43 @@ class Points(Sensor):
 
 
 SENSORS = {sensor.kind: sensor for sensor in (Hemisphere, Window, Points)}
+OPTIONS = {"hemisphere": ("cells",), **dict.fromkeys(CENTRES, ("cells", "radius")), "points": ("towards",)}
+"""What `by_name` knows, and the options that shape it."""
+
+
+def by_name(
+    name: str | None = None,
+    *,
+    cells: Sequence[int] | None = None,
+    radius: float | None = None,
+    towards: Sequence[tuple[float, float]] | None = None,
+) -> Sensor:
+    """The sensor of a name, for those who have words: ``hemisphere``; ``retro``, ``mirror`` or ``normal``; ``points``.
+
+    Parameters
+    ----------
+    name : a hemisphere if None, or points if there are some in ``towards``
+    cells : rows and columns of a `Hemisphere`; the one number of a `Window`
+    radius : half the width of a window in degrees
+    towards : the angles of `Points`
+
+    Raises ParameterError for an option that the sensor does not have, and where it raises one itself.
+    """
+    name = name or ("points" if towards else "hemisphere")
+    if name not in OPTIONS:
+        raise UnknownNameError("sensor", name, OPTIONS)
+    refuse_unused({"cells": cells, "radius": radius, "towards": towards}, OPTIONS[name], f"sensor {name}")
+    if name == "points":
+        if not towards:
+            raise ParameterError("towards: sensor points needs the directions, such as 60:0,30:180.")
+        return Points(tuple(towards))
+    count, form = (2, "ROWSxCOLUMNS") if name == "hemisphere" else (1, "N")
+    if cells is not None and len(cells) != count:
+        raise ParameterError(f"cells: sensor {name} takes {form}.")
+    if name == "hemisphere":
+        return Hemisphere(*(cells or ()))
+    window = Window(name) if radius is None else Window(name, radius)
+    return window if cells is None else replace(window, n=cells[0])
 
 
 def from_description(description: dict[str, Any]) -> Sensor:

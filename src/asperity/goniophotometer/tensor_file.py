@@ -58,7 +58,7 @@ def write(measurement: Measurement, path: str | Path) -> None:
     from mitsuba.python import tensor_io
 
     sensor, values = measurement.sensor, measurement.summed.value
-    theta, phi, rows = grid(sensor, measurement.incident)
+    theta, phi, rows = angles_of_incidence(sensor, measurement.incident)
     assert isinstance(sensor, Hemisphere)
     if not (np.all(np.isfinite(values)) and np.all(measurement.paths.sum(axis=0))):
         raise ParameterError("values: expected finite ones in all directions of incidence.")
@@ -99,7 +99,7 @@ def write(measurement: Measurement, path: str | Path) -> None:
         )
 
 
-def grid(sensor: Sensor, incident: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def angles_of_incidence(sensor: Sensor, incident: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """θ_i and φ_i in radians, φ_i from [-π, π), and the rows (φ_i, θ_i) of a measurement that belong to them.
 
     Raises ParameterError if what is measured so cannot be written.

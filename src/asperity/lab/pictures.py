@@ -15,7 +15,7 @@ from asperity.lab.checks import Curves, Histogram, Result, Violations
 MOST_POINTS = 20_000  # more only cover each other
 
 
-def draw(result: Result, path: str | Path) -> None:
+def write(result: Result, path: str | Path) -> None:
     """Write a PNG of what ``result`` measured."""
     if result.evidence is None:
         raise ParameterError(f"check {result.name!r} measured nothing that can be drawn")

@@ -20,7 +20,7 @@ from asperity.errors import ParameterError, UnreadableFileError, readable
 
 FORMATS = (".ply", ".obj", ".serialized")
 BUFFERS = ("vertex_positions", "vertex_normals", "vertex_texcoords")
-"""Names under which Mitsuba keeps what `Mesh` names first."""
+"""Names under which Mitsuba keeps what `ShadedMesh` names first."""
 FITTED_SIZE = 2.2
 """Longest edge of the bounding box of a user's object, in scene units."""
 CREASE = 40.0
@@ -32,7 +32,7 @@ STAR_SHAPED = 0.3
 Array = NDArray[np.float64]
 
 
-class Mesh(NamedTuple):
+class ShadedMesh(NamedTuple):
     """Arrays (N, 3), (N, 3), (N, 2), and vertex indices (M, 3) of triangles, counterclockwise seen from outside.
 
     ``attributes`` are more arrays of one row a vertex or face, as ``vertex_...`` and ``face_...``.
@@ -45,7 +45,7 @@ class Mesh(NamedTuple):
     attributes: Mapping[str, Array] = MappingProxyType({})
 
 
-def to_mitsuba(mesh: Mesh, bsdf: dict[str, Any] | mi.BSDF) -> mi.Mesh:
+def to_mitsuba(mesh: ShadedMesh, bsdf: dict[str, Any] | mi.BSDF) -> mi.Mesh:
     """The mesh as a shape of the current variant."""
     properties = mi.Properties()
     properties["mesh_bsdf"] = loading.load(bsdf) if isinstance(bsdf, dict) else bsdf
@@ -68,7 +68,7 @@ def to_mitsuba(mesh: Mesh, bsdf: dict[str, Any] | mi.BSDF) -> mi.Mesh:
     return shape
 
 
-def from_file(path: str | Path, crease: float | None = None) -> Mesh:
+def from_file(path: str | Path, crease: float | None = None) -> ShadedMesh:
     """A user's object (z up), scaled to the preview, centred, and standing on z = 0.
 
     Normals and texture coordinates in the file are kept. Where there are no normals, faces that meet at up to CREASE
@@ -90,7 +90,7 @@ def from_file(path: str | Path, crease: float | None = None) -> Mesh:
 
 
 class Content(NamedTuple):
-    """What a file holds: as a `Mesh`, but None for what it lacks; faces without area are left out."""
+    """What a file holds: as a `ShadedMesh`, but None for what it lacks; faces without area are left out."""
 
     vertices: Array
     normals: Array | None
@@ -99,11 +99,11 @@ class Content(NamedTuple):
     attributes: Mapping[str, Array]
 
 
-def completed(content: Content, crease: float) -> tuple[Mesh, list[str]]:
+def completed(content: Content, crease: float) -> tuple[ShadedMesh, list[str]]:
     """The mesh with what the content lacks, and what was made, in words."""
     vertices, normals, uvs, faces, attributes = content
     if normals is not None and uvs is not None:
-        return Mesh(vertices, normals, uvs, faces, attributes), []
+        return ShadedMesh(vertices, normals, uvs, faces, attributes), []
     made, corners = [], faces.ravel()  # every corner gets a vertex of its own
     new_normals, smooth = creased(vertices, faces, crease)
     if normals is None:
@@ -112,7 +112,7 @@ def completed(content: Content, crease: float) -> tuple[Mesh, list[str]]:
         new_uvs, how = projected(vertices, faces, smooth)
         made.append(f"texture coordinates, {how}")
     attributes = {name: x[corners] if name.startswith("vertex_") else x for name, x in attributes.items()}
-    mesh = Mesh(
+    mesh = ShadedMesh(
         vertices[corners],
         new_normals if normals is None else normals[corners],
         new_uvs if uvs is None else uvs[corners],

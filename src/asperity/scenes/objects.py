@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
-from asperity.scenes.meshes import Array, Mesh
+from asperity.scenes.meshes import Array, ShadedMesh
 
 PAWN_PROFILE = {
     "underside": [(0, 0), (0.25, 0), (0.5, 0), (0.66, 0), (0.73, 0), (0.755, 0.012), (0.765, 0.035)],
@@ -33,7 +33,7 @@ KNOT_POSE = Rotation.from_euler("zxz", [90, 90, 25], degrees=True).as_matrix()
 """Stands the knot up, one lobe on top, turned a little away from the camera."""
 
 
-def pawn(columns: int = 512, rows: int = 400) -> Mesh:
+def pawn(columns: int = 512, rows: int = 400) -> ShadedMesh:
     """A turned chess pawn; u follows the turning, v runs up the profile by arc length."""
     polar = np.linspace(0.74, 0, 12) * np.pi  # the head, as an angle from the zenith
     step = polar[0] - polar[1]
@@ -49,14 +49,14 @@ def pawn(columns: int = 512, rows: int = 400) -> Mesh:
     return revolve(spline(t), spline(t, 1), columns)
 
 
-def sphere(columns: int = 512, rows: int = 256) -> Mesh:
+def sphere(columns: int = 512, rows: int = 256) -> ShadedMesh:
     """The unit sphere; u follows the parallels, v the meridians."""
     angle = np.linspace(0, np.pi, rows + 1)  # from the nadir
     profile = np.stack([np.sin(angle), 1 - np.cos(angle)], axis=1)
     return revolve(profile, np.stack([np.cos(angle), np.sin(angle)], axis=1), columns)
 
 
-def knot(columns: int = 1200, rows: int = 128) -> Mesh:
+def knot(columns: int = 1200, rows: int = 128) -> ShadedMesh:
     """A (2,3) torus knot standing on two of its three lobes; u runs along the tube, v around it."""
     u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
     toroidal, poloidal, around = 4 * np.pi * u, 6 * np.pi * u, 2 * np.pi * v
@@ -75,10 +75,10 @@ def knot(columns: int = 1200, rows: int = 128) -> Mesh:
     vertices, normals = vertices @ KNOT_POSE.T, normals @ KNOT_POSE.T
     vertices[..., 2] -= vertices[..., 2].min()
     faces = np.concatenate(lattice(rows, columns)).reshape(-1, 3)
-    return Mesh(vertices.reshape(-1, 3), normals.reshape(-1, 3), np.stack([u, v], axis=-1).reshape(-1, 2), faces)
+    return ShadedMesh(vertices.reshape(-1, 3), normals.reshape(-1, 3), np.stack([u, v], axis=-1).reshape(-1, 2), faces)
 
 
-def revolve(profile: Array, tangents: Array, columns: int) -> Mesh:
+def revolve(profile: Array, tangents: Array, columns: int) -> ShadedMesh:
     """Turn a profile of (radius, height), from the axis below to the axis above, about the z axis."""
     rows = len(profile) - 1
     tangents = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
@@ -99,7 +99,7 @@ def revolve(profile: Array, tangents: Array, columns: int) -> Mesh:
         radius, height = curve[:, :1], np.broadcast_to(curve[:, 1:], azimuth.shape)
         return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height], axis=-1).reshape(-1, 3)
 
-    return Mesh(turned(profile), turned(outward), np.stack([u, v], axis=-1).reshape(-1, 2), faces.reshape(-1, 3))
+    return ShadedMesh(turned(profile), turned(outward), np.stack([u, v], axis=-1).reshape(-1, 2), faces.reshape(-1, 3))
 
 
 def lattice(rows: int, columns: int) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:

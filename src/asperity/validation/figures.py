@@ -20,7 +20,7 @@ def axes(x: str, y: str, title: str) -> tuple[Figure, Axes]:
     return figure, found
 
 
-def grid(rows: int, columns: int, x: str, y: str, title: str) -> tuple[Figure, np.ndarray]:
+def panels(rows: int, columns: int, x: str, y: str, title: str) -> tuple[Figure, np.ndarray]:
     """Empty diagrams (rows, columns)."""
     figure = _figure(3.1 * columns, 2.2 * rows + 0.6)
     figure.suptitle(title)

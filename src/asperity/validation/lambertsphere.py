@@ -118,7 +118,9 @@ def brdf(effort: Effort) -> Section:
         errors = (f"{np.sqrt(np.mean(e**2)):.2%} / {np.abs(e).max():.1%}" for e in relative.values())
         rows.append((albedo, f"{noise:.2%}", *errors))
         figure_rows[albedo] = truth, found
-    figure, grid = figures.grid(1, 3, "φ between wi and wo [°]; 0: against the light", "f cos θₒ [1/sr]", "60° to 60°")
+    figure, grid = figures.panels(
+        1, 3, "φ between wi and wo [°]; 0: against the light", "f cos θₒ [1/sr]", "60° to 60°"
+    )
     row = INCIDENT.index((60.0, 0.0))
     columns = [k for k, (theta, _) in enumerate(OUTGOING) if theta == 60]
     for axes, albedo in zip(grid[0], (0.2, 0.8, 0.99)):
@@ -283,7 +285,7 @@ def ball(effort: Effort, radius: float = 150.0, fraction: float = 0.07, size: in
             "bsdf": {"type": "diffuse", "reflectance": BOND},
         },
     }
-    figure, grid = figures.grid(
+    figure, grid = figures.panels(
         2, len(shapes), "", "", f"c {albedo}, {fraction:.0%} of the volume; front and side light"
     )
     rows = []
@@ -327,7 +329,7 @@ def lit(
 
 def sheet(effort: Effort, size: int = 128, spp: int = 64) -> Section:
     """Fig. 9 and 11: spheres under front, side and back light."""
-    figure, grid = figures.grid(3, len(SHEET), "", "", "front, side and back light; reflectance 0.5")
+    figure, grid = figures.panels(3, len(SHEET), "", "", "front, side and back light; reflectance 0.5")
     for row, angle in zip(grid, (0, 90, 150)):
         for axes, (name, material) in zip(row, SHEET.items()):
             image = lit({"type": "sphere", "bsdf": material | {"reflectance": 0.5}}, angle, 1.1, size, spp, effort.tick)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
+from .. import __version__
 from ..files import atomically
 from ..goniophotometer import Estimate
 
@@ -63,6 +65,9 @@ class Effort(NamedTuple):
         return self._replace(paths=max(self.paths, paths))
 
 
+QUICK, FULL = Effort(4e5, 16), Effort(4e6, 32)
+
+
 def agreement(claim: str, truth: Estimate, model: np.ndarray, tiles: int, tolerance: float) -> Finding:
     """Whether all numbers of a model lie within the truth's standard errors, and a relative ``tolerance`` of its own.
 
@@ -98,6 +103,45 @@ def told_apart(claim: str, ours: Finding, rival: Finding) -> Finding:
 def passed(sections: Iterable[Section]) -> bool:
     """Whether no finding failed."""
     return all(finding.passed is not False for section in sections for finding in section.findings)
+
+
+class Report:
+    """The report on a model, ``report.md`` in ``folder``, as far as its ``sections`` are done."""
+
+    def __init__(self, model: str, effort: Effort, folder: Path, quick: bool = False):
+        self.model, self.effort, self.folder, self.quick = model, effort, folder, quick
+        self.sections: list[Section] = []
+        self.finished = False
+        self.path, self.seconds = folder / "report.md", 0.0
+        self.start = time.perf_counter()
+        folder.mkdir(parents=True, exist_ok=True)  # now, not after minutes of tracing
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is finished, and no finding failed."""
+        return self.finished and passed(self.sections)
+
+    def add(self, section: Section) -> None:
+        """Add a section, and write what there is."""
+        self.sections.append(section)
+        self._write("Not finished. ", new=1)
+
+    def close(self) -> None:
+        """Write it for the last time."""
+        self._write("" if self.finished else "Stopped early. ", new=0)
+
+    def _write(self, early: str, new: int) -> None:
+        """Write it; only the last sections, if they are ``new``, have pictures that are not there yet."""
+        self.seconds = time.perf_counter() - self.start
+        preface = (
+            f"{early}Made by `asperity validate {self.model}{' --quick' if self.quick else ''}`, asperity "
+            f"{__version__}, in {self.seconds:.0f} s: {self.effort.paths:g} paths per direction (some sections take a "
+            f"quarter or eight times that) in {self.effort.tiles} groups, seed {self.effort.seed}. Each group has a "
+            "tile of its own, where the surface is random. Errors are standard errors over the groups. The bounds are "
+            f"such that a right model fails a report with a probability of {100 * SIGNIFICANCE:g} %."
+        )
+        title = f"`{self.model}` against its microgeometry"
+        write(title, preface, self.sections, self.folder, len(self.sections) - new)
 
 
 def write(title: str, preface: str, sections: Sequence[Section], folder: Path, drawn: int = 0) -> Path:

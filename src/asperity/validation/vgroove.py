@@ -249,7 +249,7 @@ def slices_by_bounce(title: str, measured: Measurement, model: np.ndarray, theta
     """The plane of incidence: bars are traced, lines are the model's."""
     sensor = measured.sensor
     assert isinstance(sensor, Hemisphere)
-    figure, grid = figures.grid(len(thetas), 4, "θₒ [°], negative towards the light", "f cos θₒ [1/sr]", title)
+    figure, grid = figures.panels(len(thetas), 4, "θₒ [°], negative towards the light", "f cos θₒ [1/sr]", title)
     forth, back = sensor.columns // 2, 0
     cells = np.concatenate(
         [np.arange(sensor.rows)[::-1] * sensor.columns + back, np.arange(sensor.rows) * sensor.columns + forth]
@@ -340,7 +340,7 @@ def furnace(effort: Effort) -> Section:
 
 def furnace_spheres(size: int = 128, spp: int = 128, tick: Callable[..., None] = lambda *_: None) -> Any:
     """Spheres in a white furnace, GGX, alpha 0.5: what is seen is what is lost."""
-    figure, grid = figures.grid(1, 4, "", "", "white furnace, GGX, α 0.5")
+    figure, grid = figures.panels(1, 4, "", "", "white furnace, GGX, α 0.5")
     cases: dict[str, dict[str, Any]] = {
         "symmetric, one bounce (Cook-Torrance)": {"max_bounces": 1},
         "symmetric, all": {},

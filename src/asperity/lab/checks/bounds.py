@@ -13,7 +13,7 @@ from .derivatives import (
     GRADIENT_ERROR,
     ROUNDING,
     Calls,
-    Estimate,
+    FiniteDifference,
     Parameters,
     Values,
     along,
@@ -90,7 +90,7 @@ def bounds(bsdf: mi.BSDF) -> Result:
                     parameters.forward(virtual, moved(values, direction, step), direction)
                     for step in (0, STEP, 2 * STEP)
                 )
-                inside = Estimate(2 * near - far, np.abs(near - far), ROUNDING * np.abs(near))
+                inside = FiniteDifference(2 * near - far, np.abs(near - far), ROUNDING * np.abs(near))
                 errors[name] = difference_error(there, [inside], weight, if_rough=0.0)
                 bad += [f"{name}: derivative"] * (not np.isfinite(there).all())
     worst = max(errors, key=lambda name: np.nan_to_num(errors[name], nan=np.inf), default="")

@@ -19,7 +19,7 @@ NOT_RECIPROCAL = {
 """By the class's name in Mitsuba, what is not reciprocal by what it describes, and why."""
 
 
-def agreement(
+def compare_lanes(
     name: str,
     wi: mi.Vector3f,
     wo: mi.Vector3f,
@@ -66,7 +66,7 @@ def weights(bsdf: mi.BSDF) -> Result:
     density = evaluate.to_numpy(evaluate.pdf(bsdf, samples.wi, samples.drawn.wo), SAMPLES)[:, samples.smooth]
     ratio = np.divide(value, density, out=np.zeros_like(value), where=density > 0)
     why = "weight = eval / pdf; the half vector found again from wo has rounding errors, which narrow lobes amplify"
-    return agreement("weight", wi, wo, (samples.weight[:, samples.smooth], ratio), (1e-3, 1e-5), 1e-3, why)
+    return compare_lanes("weight", wi, wo, (samples.weight[:, samples.smooth], ratio), (1e-3, 1e-5), 1e-3, why)
 
 
 def sampled_pdf(bsdf: mi.BSDF) -> Result:
@@ -77,7 +77,7 @@ def sampled_pdf(bsdf: mi.BSDF) -> Result:
     density = evaluate.to_numpy(evaluate.pdf(bsdf, samples.wi, samples.drawn.wo), SAMPLES)[:, samples.smooth]
     returned = evaluate.to_numpy(samples.drawn.pdf, SAMPLES)[:, samples.smooth]
     why = "both are the density of the same direction, up to rounding errors, which narrow lobes amplify"
-    return agreement("sampled-pdf", wi, wo, (returned, density), (1e-3, 1e-5), 1e-3, why)
+    return compare_lanes("sampled-pdf", wi, wo, (returned, density), (1e-3, 1e-5), 1e-3, why)
 
 
 def eval_pdf(bsdf: mi.BSDF) -> Result:
@@ -88,7 +88,7 @@ def eval_pdf(bsdf: mi.BSDF) -> Result:
     apart = (evaluate.eval(bsdf, wi, wo), evaluate.pdf(bsdf, wi, wo))
     single = np.concatenate([evaluate.to_numpy(x, SAMPLES) for x in apart])
     why = "the same formulas, compiled apart: fused multiply-adds may round differently"
-    return agreement("eval-pdf", wi, wo, (both, single), (1e-4, 1e-6), 1e-4, why)
+    return compare_lanes("eval-pdf", wi, wo, (both, single), (1e-4, 1e-6), 1e-4, why)
 
 
 def determinism(bsdf: mi.BSDF) -> Result:
@@ -128,8 +128,8 @@ def reciprocity(bsdf: mi.BSDF) -> Result:
         return Result("reciprocity", None, "has only delta lobes")
     refracts = mi.has_flag(bsdf.flags(), mi.BSDFFlags.NonSymmetric)
     why = "Helmholtz, float32" + ("; refracted pairs: radiance against importance, for the η²" if refracts else "")
-    found = agreement("reciprocity", wi, wo, at_random, (1e-3, 1e-5), 1e-5, why)
-    apart = agreement("reciprocity", i, o, at_special, (1e-3, 1e-5), 0, why + "; normal, coplanar, retro, mirror")
+    found = compare_lanes("reciprocity", wi, wo, at_random, (1e-3, 1e-5), 1e-5, why)
+    apart = compare_lanes("reciprocity", i, o, at_special, (1e-3, 1e-5), 0, why + "; normal, coplanar, retro, mirror")
     return apart if found.passed and not apart.passed else found
 
 

@@ -25,7 +25,7 @@ ROUNDING = 16 * np.finfo(np.float32).eps
 Values = Mapping[str, np.ndarray]
 
 
-class Estimate(NamedTuple):
+class FiniteDifference(NamedTuple):
     """A derivative, lane by lane; by how much those of two steps disagree; and what rounding errors may do to it."""
 
     derivative: np.ndarray
@@ -129,7 +129,7 @@ class Parameters:
         slopes = {key: np.array(dr.grad(leaf), dtype=np.float64) for key, leaf in leaves.items()}
         return np.array([np.sum(slopes[key] * directions[key]) for key in leaves])
 
-    def differences(self, quantity: Quantity, values: Values, directions: Values) -> list[Estimate]:
+    def differences(self, quantity: Quantity, values: Values, directions: Values) -> list[FiniteDifference]:
         """Finite differences along ``directions``, extrapolated from each pair of `STEPS` (Richardson).
 
         Central ones; then those of either side, which differ where a parameter is at the node of a table: any will do.
@@ -144,9 +144,9 @@ class Parameters:
         for h, *sides in zip(STEPS, pairwise(rights), pairwise(lefts)):
             noise = ROUNDING * np.abs(middle) / h
             coarse, fine = (sum(slopes) / 2 for slopes in zip(*sides))
-            estimates.append(Estimate(fine + (fine - coarse) / 3, np.abs(fine - coarse), noise))
+            estimates.append(FiniteDifference(fine + (fine - coarse) / 3, np.abs(fine - coarse), noise))
             doubt = np.max([np.abs(near - far) for far, near in sides], axis=0)
-            estimates += [Estimate(2 * near - far, doubt, noise) for far, near in sides]
+            estimates += [FiniteDifference(2 * near - far, doubt, noise) for far, near in sides]
         return estimates
 
 
@@ -163,7 +163,7 @@ def mean_relative(error: np.ndarray, size: np.ndarray, weight: np.ndarray) -> fl
 
 def difference_error(
     automatic: np.ndarray,
-    estimates: list[Estimate],
+    estimates: list[FiniteDifference],
     weight: np.ndarray,
     if_rough: float = np.inf,
 ) -> float:

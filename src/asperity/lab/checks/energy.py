@@ -16,16 +16,16 @@ from .samples import SAMPLES, draw_samples, incident
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Albedo:
     """Means and standard errors, a channel each."""
 
     mean: np.ndarray
     error: np.ndarray
 
     @staticmethod
-    def of(values: np.ndarray) -> Estimate:
+    def of(values: np.ndarray) -> Albedo:
         """Estimate the mean of values (channels, n)."""
-        return Estimate(values.mean(axis=1), values.std(axis=1) / np.sqrt(values.shape[1]))
+        return Albedo(values.mean(axis=1), values.std(axis=1) / np.sqrt(values.shape[1]))
 
 
 def energy(bsdf: mi.BSDF, significance: float = SIGNIFICANCE) -> Result:
@@ -37,7 +37,7 @@ def energy(bsdf: mi.BSDF, significance: float = SIGNIFICANCE) -> Result:
         z = evaluate.direction(*angles).z * samples.drawn.wo.z
         # Radiance grows by 1/η² as it leaves a dense medium; its energy does not.
         squeezed = evaluate.to_numpy(dr.select(z < 0, dr.square(samples.drawn.eta), 1), SAMPLES)
-        estimates.append(Estimate.of(samples.weight * squeezed))
+        estimates.append(Albedo.of(samples.weight * squeezed))
     mean, error = (np.array([getattr(e, name) for e in estimates]) for name in ("mean", "error"))
     z_score = float(stats.norm.isf(sidak(mean.size, significance)))
     margin = (1 + 1e-5 + z_score * error - mean).min(axis=1)
@@ -59,7 +59,7 @@ def ratios(bsdf: mi.BSDF, wi: mi.Vector3f, wo: mi.Vector3f, used: np.ndarray, un
     return np.where(used & (evaluate.to_numpy(density, used.size) > 0), values, 0)
 
 
-def albedos(bsdf: mi.BSDF, angles: tuple[float, float], n: int = 2 * SAMPLES) -> dict[str, Estimate]:
+def albedos(bsdf: mi.BSDF, angles: tuple[float, float], n: int = 2 * SAMPLES) -> dict[str, Albedo]:
     """Estimate the albedo, without delta lobes, in three independent ways.
 
     The third way would draw directions uniformly; but then narrow lobes are missed, and the standard error with them.
@@ -71,9 +71,9 @@ def albedos(bsdf: mi.BSDF, angles: tuple[float, float], n: int = 2 * SAMPLES) ->
     everywhere = ratios(bsdf, wi, evaluate.uniform_sphere(n, 18), np.ones(n, dtype=bool), 0.5)
     own = ratios(bsdf, wi, third.drawn.wo, third.smooth, 0.5)
     return {
-        "sampled weights": Estimate.of(np.where(first.smooth, first.weight, 0)),
-        "eval / pdf": Estimate.of(ratios(bsdf, wi, second.drawn.wo, second.smooth, 0)),
-        "eval at uniform directions": Estimate.of((own + everywhere) / 2),
+        "sampled weights": Albedo.of(np.where(first.smooth, first.weight, 0)),
+        "eval / pdf": Albedo.of(ratios(bsdf, wi, second.drawn.wo, second.smooth, 0)),
+        "eval at uniform directions": Albedo.of((own + everywhere) / 2),
     }
 
 

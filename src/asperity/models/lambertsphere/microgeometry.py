@@ -10,13 +10,13 @@ import mitsuba as mi
 import numpy as np
 
 from ...errors import ParameterError
-from ...goniophotometer.medium import HalfSpace
+from ...goniophotometer.medium import SparseMedium
 from ...goniophotometer.tile import Tile
 from .transport import root
 
 
 class Sphere:
-    """A Lambertian sphere far away, as a particle of a `HalfSpace`; ``albedo`` is a spectrum.
+    """A Lambertian sphere far away, as a particle of a `SparseMedium`; ``albedo`` is a spectrum.
 
     Nothing of the model's is used: light meets a disc that faces it, evenly, and leaves the sphere there by the cosine.
     """
@@ -78,9 +78,9 @@ class RandomWalk:
         """All of it."""
         return {"type": "random walk"} | asdict(self)
 
-    def tile(self, rng: np.random.Generator) -> HalfSpace:
+    def piece(self, rng: np.random.Generator) -> SparseMedium:
         """Always the same: the places of the spheres are drawn with the rays."""
-        return HalfSpace(Sphere(self.albedo))
+        return SparseMedium(Sphere(self.albedo))
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class ExplicitSpheres:
         """All of it."""
         return {"type": "spheres"} | asdict(self)
 
-    def tile(self, rng: np.random.Generator) -> Tile:
+    def piece(self, rng: np.random.Generator) -> Tile:
         """A slab with spheres of its own."""
         path = 4 / (3 * self.fraction)
         width, depth = self.width * path, self.depth * path

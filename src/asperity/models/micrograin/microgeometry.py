@@ -86,7 +86,7 @@ class ExplicitGrains:
         radii = 1 / np.array([self.beta_x, self.beta_y])
         return (centres * self.size)[np.all(np.abs(centres) * self.size < self.size / 2 + radii, axis=1)]
 
-    def tile(self, rng: np.random.Generator) -> Tile:
+    def piece(self, rng: np.random.Generator) -> Tile:
         """A tile with grains of its own."""
         (width, depth), centres = self.size, self.centres(rng)
         n = len(centres)

@@ -53,7 +53,7 @@ class ExplicitGrooves:
         """All of it."""
         return {"type": "grooves"} | asdict(self)
 
-    def tile(self, rng: np.random.Generator) -> Grooves:
+    def piece(self, rng: np.random.Generator) -> Grooves:
         """Always the same; the grooves are drawn with the rays."""
         return Grooves(self.draw, mi.load_dict(self.facet))
 
