@@ -10,7 +10,7 @@ from helpers import directions, unit
 from hypothesis import given
 from hypothesis import strategies as st
 
-from asperity.models.micrograin.shadows import Shadows, shadow
+from asperity.models.micrograin.shadows import Shadows, shadow, silhouette
 
 
 def families(rng, n):
@@ -52,6 +52,30 @@ def test_union_of_shadows_is_what_rays_see():
     for i, o, h in zip(directions(rng, 12, 0.3).T, directions(rng, 12, 0.3).T, rng.uniform(0, 0.9, 12)):
         union = Shadows(llvm.Array3f64(*map(float, i)), llvm.Array3f64(*map(float, o))).union(llvm.Float64(h))
         assert float(union[0]) == pytest.approx(area_by_counting(i, o, h), abs=0.01)
+
+
+def test_outlines_cross_on_both_cylinders():
+    """Where they cross within both shadows: p.i = p.o < 0 and |p|^2 - (p.i)^2 = 1, and either finds the same point."""
+    rng = np.random.default_rng(4)
+    i, o = directions(rng, 4000, 0.05), directions(rng, 4000, 0.05)
+    h = rng.uniform(0, 1, 4000)
+    arrays = llvm.Array3f64(i), llvm.Array3f64(o)
+    points, inside = [], np.ones(4000, bool)
+    for (w, other), outline in zip(((i, o), (o, i)), Shadows(*arrays).outlines):
+        cos_alpha, sin_alpha, _ = silhouette(outline.sin, outline.cos, llvm.Float64(h))
+        cos_psi, sin_psi = (np.array(x) for x in outline.crossing(llvm.Float64(h), cos_alpha, sin_alpha))
+        along, across = unit(w[:2]), unit(np.stack([-w[1], w[0]]))
+        across = -across * np.sign((across * other[:2]).sum(0))  # the other shadow lies opposite to its direction
+        s = np.hypot(*w[:2])
+        p = np.concatenate([(h * s - cos_psi) / w[2] * along + sin_psi * across, [h]])
+        inside &= np.abs(sin_psi) < 0.999 * np.array(sin_alpha)
+        points.append(p)
+    p, q = (point[:, inside] for point in points)
+    i, o = i[:, inside], o[:, inside]
+    t = (p * i).sum(0)
+    assert inside.sum() > 500 and (t < 0).all()
+    assert np.abs(p - q).max() < 1e-6 and np.abs(t - (p * o).sum(0)).max() < 1e-6
+    assert np.abs((p * p).sum(0) - t * t - 1).max() < 1e-6
 
 
 def directions_of_floats():

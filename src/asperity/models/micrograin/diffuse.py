@@ -149,7 +149,7 @@ class LitArcs:
     forward: tuple[Any, Any]  # unit vector at x = 0
     turn: Any  # 1 if x is counted counterclockwise, else -1
     angle: Any  # from i to o, in [0, pi]
-    sin: Any
+    sin: Any  # of the angle
     cos: Any
 
     @classmethod

@@ -41,7 +41,7 @@ def silhouette(sin: Any, cos: Any, h: Any) -> tuple[Any, Any, Any]:
     cos alpha = h / sin; alpha and gamma are 0 if there is no shadow.
     """
     cos_alpha = dr.minimum(h / sin, 1)
-    sin_alpha = _other(cos_alpha)
+    sin_alpha = _sine(cos_alpha)
     return cos_alpha, sin_alpha, dr.atan2(sin_alpha, cos * cos_alpha + 1e-20)
 
 
@@ -126,25 +126,25 @@ class Outline:
         """
         sin, cos = self.sin, self.cos
         cos_alpha = dr.minimum(h / sin, 1)
-        sin_alpha = _other(cos_alpha)
-        cos_psi, sin_psi = self._crossing(h, cos_alpha, sin_alpha)
-        psi = _sum_of_angles(cos_alpha, sin_alpha, cos_psi, sin_psi)
-        eta = _sum_of_angles(cos * cos_alpha, sin_alpha, cos_psi - h * sin, cos * sin_psi)
-        return _beyond_disc(h, sin, cos, psi, sin_alpha + sin_psi, eta) / 2
+        sin_alpha = _sine(cos_alpha)
+        cos_psi, sin_psi = self.crossing(h, cos_alpha, sin_alpha)
+        alpha_psi = _sum_of_angles(cos_alpha, sin_alpha, cos_psi, sin_psi)
+        gamma_eta = _sum_of_angles(cos * cos_alpha, sin_alpha, cos_psi - h * sin, cos * sin_psi)
+        return _beyond_disc(h, sin, cos, alpha_psi, sin_alpha + sin_psi, gamma_eta) / 2
 
-    def _crossing(self, h: Any, cos_alpha: Any, sin_alpha: Any) -> tuple[Any, Any]:
+    def crossing(self, h: Any, cos_alpha: Any, sin_alpha: Any) -> tuple[Any, Any]:
         """(cos psi, sin psi) of the crossing p_+, clipped to [-alpha, alpha]."""
-        cos_sum = dr.minimum(self.level * h, 1)  # psi + axis
-        sin_sum = _other(cos_sum)
+        cos_sum = dr.minimum(self.level * h, 1)  # of psi + axis
+        sin_sum = _sine(cos_sum)
         sin_psi = sin_sum * self.cos_axis - cos_sum * self.sin_axis
         cos_psi = cos_sum * self.cos_axis + sin_sum * self.sin_axis
         beyond = (cos_psi < 0) | (dr.abs(sin_psi) > sin_alpha)  # sines tell small angles apart, cosines do not
         return dr.select(beyond, cos_alpha, cos_psi), dr.select(beyond, dr.copysign(sin_alpha, sin_psi), sin_psi)
 
 
-def _other(x: Any) -> Any:
-    """The sine that belongs to a cosine, without cancellation near 1."""
-    return dr.safe_sqrt((1 - x) * (1 + x))
+def _sine(cos: Any) -> Any:
+    """The sine of an angle in [0, pi], without cancellation where its cosine is near 1."""
+    return dr.safe_sqrt((1 - cos) * (1 + cos))
 
 
 def _sum_of_angles(x: Any, y: Any, u: Any, v: Any) -> Any:
