@@ -3,35 +3,41 @@
 from __future__ import annotations
 
 import drjit as dr
-import mitsuba as mi
 
 from asperity import models, plugin
+from asperity.lobes import Lifted
+from asperity.microfacet.ggx import normal_in_sphere_space, sample_visible_normal, smith_lambda
+from asperity.microfacet.masking import smith_masking
 from asperity.microfacet.numerics import log1p
-from asperity.models.micrograin import Micrograin, smith
-from asperity.models.micrograin.grains import exposure, normal_in_sphere_space
+from asperity.microfacet.sampling import reflect
+from asperity.models.micrograin import Micrograin
+from asperity.models.micrograin.grains import exposure
+from asperity.models.micrograin.specular import Specular
 
 
-class SampledOtherwise(Micrograin):
-    """Specular grains whose half vector has the density ``self.density_of_normals``."""
+class SampledOtherwise(Specular):
+    """Grains whose half vector is drawn by ``normal``, with the density ``density``."""
 
-    declarations = classmethod(lambda cls: Micrograin.declarations())
-
-    def _specular(self, si, active, grains, wi, wo):
-        value, _ = super()._specular(si, active, grains, wi, wo)
+    def eval_pdf(self, wi, wo):
+        value, _ = super().eval_pdf(wi, wo)
         m = dr.normalize(wi + wo)
-        return value, self.density_of_normals(grains, wi, m) / (4 * dr.dot(wi, m))
+        return value, self.density(wi, m) / (4 * dr.dot(wi, m))
+
+    def draw(self, wi, u, v):
+        m = self.normal(wi, v)
+        return reflect(wi, dr.normalize(type(wi)(self.grains.beta_x * m.x, self.grains.beta_y * m.y, m.z)))
 
 
 class NDF(SampledOtherwise):
     """Normals by the NDF (Lucas 2024, Eq. 13 to 15)."""
 
-    def _visible_normal(self, grains, wi, sample2):
-        r2 = log1p(-sample2.x * grains.tau_0) / log1p(-grains.tau_0)  # sin^2 in sphere space
-        sin, cos = dr.sincos(2 * dr.pi * sample2.y)
-        x, y = dr.sqrt(r2) * cos, dr.sqrt(r2) * sin
-        return dr.normalize(mi.Normal3f(grains.beta_x * x, grains.beta_y * y, dr.safe_sqrt(1 - r2)))
+    def normal(self, wi, v):
+        r2 = log1p(-v.x * self.grains.tau_0) / log1p(-self.grains.tau_0)  # sin^2 in sphere space
+        sin, cos = dr.sincos(2 * dr.pi * v.y)
+        return type(wi)(dr.sqrt(r2) * cos, dr.sqrt(r2) * sin, dr.safe_sqrt(1 - r2))
 
-    def density_of_normals(self, grains, wi, m):
+    def density(self, wi, m):
+        grains = self.grains
         h, d_ggx = normal_in_sphere_space(m, grains.beta_x, grains.beta_y)
         return dr.pi * grains.r * d_ggx * exposure(grains.r, h, 0) / grains.tau_0 * m.z
 
@@ -39,16 +45,28 @@ class NDF(SampledOtherwise):
 class GGX(SampledOtherwise):
     """Visible normals of GGX with roughness (beta_x, beta_y)."""
 
-    def _visible_normal(self, grains, wi, sample2):
-        m = smith.sample_visible_normal(grains.to_sphere(wi), sample2.x, sample2.y)
-        return dr.normalize(mi.Normal3f(grains.beta_x * m.x, grains.beta_y * m.y, m.z))
+    def normal(self, wi, v):
+        return sample_visible_normal(self.grains.to_sphere(wi), v.x, v.y)
 
-    def density_of_normals(self, grains, wi, m):
-        _, d_ggx = normal_in_sphere_space(m, grains.beta_x, grains.beta_y)
-        return d_ggx * smith.visible_masking(grains.to_sphere(wi)) * dr.dot(wi, m) / wi.z
+    def density(self, wi, m):
+        _, d_ggx = normal_in_sphere_space(m, self.grains.beta_x, self.grains.beta_y)
+        return d_ggx * smith_masking(smith_lambda(self.grains.to_sphere(wi))) * dr.dot(wi, m) / wi.z
+
+
+def sampled(kind):
+    """The model for metal, with that lobe."""
+
+    class Sampled(Micrograin):
+        """Micrograin, sampled otherwise."""
+
+        def lobes(self, si, active):
+            (exact,) = (lifted.lobe for lifted in super().lobes(si, active))
+            return [Lifted(kind(exact.grains, exact.material, exact.shaded), exact.grains.lift)]
+
+    return Sampled
 
 
 def register() -> None:
     """Make ``micrograin_ndf`` and ``micrograin_ggx`` known in the active variant."""
-    models.MODELS |= {"micrograin_ndf": NDF, "micrograin_ggx": GGX}
+    models.MODELS |= {"micrograin_ndf": sampled(NDF), "micrograin_ggx": sampled(GGX)}
     plugin.register()

@@ -1,13 +1,15 @@
 import asperity  # noqa: F401  isort: skip
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
-from asperity.conductors import artist_friendly, materials
+from asperity.conductors import Conductor, artist_friendly, materials
+from asperity.errors import ParameterError
 from asperity.lab import evaluate
 from asperity.models import MODELS
 from asperity.models.micrograin import Micrograin
-from asperity.parameters import Declared
+from asperity.parameters import Axes, Choice, Constant, Declared, Texture, Usual
 
 
 def bitmap(low, high):
@@ -77,8 +79,6 @@ def test_an_update_is_checked_but_an_optimiser_is_free(rgb):
     params["tau_0.value"] = 1.5
     with pytest.raises(ValueError, match=r"tau_0 = 1\.5"):
         params.update()
-    import drjit as dr
-
     value = mi.Float(1.5)
     dr.enable_grad(value)
     params["tau_0.value"] = value
@@ -192,3 +192,103 @@ def test_a_parameter_of_another_class_keeps_its_name_there():
 
     assert [parameter.name for parameter in Other.declarations()] == ["roughness", "tau_0"]
     assert Micrograin.beta.name == "beta" and Micrograin.beta is not Other.roughness
+
+
+class Paint(Declared):
+    alpha = Axes("roughness", 0.3, low=0.01, high=1, usually=Usual(0.05, 0.5))
+    shine = Choice("finish", options=("matt", "gloss"))
+    ior = Texture("index", 1.5, low=1, high=3, when=("shine", "gloss"))
+    size = Constant("what a table is made from", 0.2, low=0.1, high=1)
+    metal = Conductor("metal", "none")
+
+    def update(self):
+        self.doubled = 2 * self.at("size", None, True)
+
+
+class Varnished(Paint):
+    coats = Texture("layers of varnish", 1.0, high=9)
+    shine = Choice("finish of the varnish", options=("gloss", "matt"))
+
+
+def parsed(model=Paint, **given):
+    props = mi.Properties("paint")
+    for name, value in given.items():
+        props[name] = value
+    return model.parse(props)
+
+
+def test_a_subclass_has_the_parameters_of_its_base():
+    names = [parameter.name for parameter in Varnished.declarations()]
+    assert names == ["alpha", "shine", "ior", "size", "metal", "coats"]
+    assert Varnished.shine.default == "gloss" and Paint.shine.default == "matt"
+
+
+def test_axes_are_one_number_or_two(rgb):
+    """What is not given has the default of the name without suffix."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    for given, names, expected in (
+        ({}, ["alpha"], (0.3, 0.3)),
+        ({"alpha": 0.5}, ["alpha"], (0.5, 0.5)),
+        ({"alpha_u": 0.1, "alpha_v": 0.4}, ["alpha_u", "alpha_v"], (0.1, 0.4)),
+        ({"alpha_v": 0.4}, ["alpha", "alpha_v"], (0.3, 0.4)),
+    ):
+        model = parsed(**given)
+        assert list(model.alpha.textures) == [name for name in model.children() if "alpha" in name] == names
+        assert model.alpha.isotropic == (len(names) == 1)
+        np.testing.assert_allclose([float(x[0]) for x in model.at("alpha", si, True)], expected, rtol=1e-6)
+    assert {row.name for row in Paint.rows()} > {"alpha", "alpha_u", "alpha_v"} < set(Paint.usual())
+
+
+def test_the_value_at_a_point_is_within_the_range(rgb):
+    """An optimiser's step may leave it, while no check sees it: it is differentiated."""
+    model, si = parsed(alpha=0.5), dr.zeros(mi.SurfaceInteraction3f)
+    value = mi.Float(7)
+    dr.enable_grad(value)
+    params = mi.traverse(model.alpha.textures["alpha"])
+    params["value"] = value
+    params.update()
+    assert model.at("alpha", si, True)[0][0] == 1
+
+
+@pytest.mark.parametrize("shine, ior", [("gloss", 1.7), ("gloss", None), ("matt", None)])
+def test_a_parameter_counts_when_it_says_so(rgb, shine, ior):
+    model = parsed(shine=shine, **({} if ior is None else {"ior": ior}))
+    assert (model.ior is not None) == (shine == "gloss")
+
+
+def test_a_parameter_that_does_not_count_is_refused(rgb):
+    with pytest.raises(ParameterError, match='ior: needs shine = "gloss"'):
+        parsed(ior=1.7)
+
+
+def test_a_constant_has_derivatives_and_does_not_vary(rgb):
+    model = parsed(size=0.4)
+    params = mi.traverse(model.size)
+    value = mi.Float(0.4)
+    dr.enable_grad(value)
+    params["value"] = value
+    params.update()
+    model.update()
+    dr.backward(model.doubled)
+    assert value.grad[0] == 2
+    with pytest.raises(ParameterError, match="size: a texture, where one number"):
+        parsed(size=mi.load_dict({"type": "checkerboard", "color0": 0.2, "color1": 0.3}))
+    with pytest.raises(ParameterError, match=r"size = 2.0: expected a number in \[0.1, 1\]"):
+        parsed(size=2.0)
+
+
+def test_a_metal_is_its_reflectance(rgb):
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    assert parsed().at("metal", si, True)(0.3) == 1
+    gold = parsed(material="Au").at("metal", si, True)
+    assert np.asarray(gold(mi.Float(0)))[0] == pytest.approx(1, abs=1e-6)
+    assert np.asarray(gold(mi.Float(1)))[0] > 0.9
+
+
+def test_usual_values_are_allowed():
+    for model in MODELS.values():
+        allowed = {name: both for parameter in model.declarations() for name, both in parameter.ranges().items()}
+        usual = model.usual()
+        assert set(allowed) == set(usual)
+        for name, (low, high, logarithmic) in usual.items():
+            assert allowed[name][0] <= low < high <= allowed[name][1] and not (logarithmic and low <= 0)

@@ -127,13 +127,13 @@ class LobeModel(Declared):
     def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """(f |cos_o|, solid-angle density of `sample`)."""
         lobes, chances, base_chance = self._choose(ctx, si, active)
-        above = active & (si.wi.z > 0) & (wo.z > 0)
-        wi, upper = _above(si.wi), _above(wo)
+        lit = active & (si.wi.z > 0) & (wo.z > 0)
+        wi, upper = above(si.wi), above(wo)
         value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
         for n, chance in chances.items():
             lobe_value, lobe_pdf = lobes[n].eval_pdf(wi, upper)
-            value, pdf = value + lobe_value, pdf + chance * lobe_pdf
-        value, pdf = dr.select(above, value, 0), dr.select(above, pdf, 0)
+            value, pdf = value + mi.UnpolarizedSpectrum(lobe_value), pdf + chance * lobe_pdf
+        value, pdf = dr.select(lit, value, 0), dr.select(lit, pdf, 0)
         if base_chance is None:
             return value, pdf
         base_value, base_pdf = self.base.eval_pdf(self._base_context(ctx), si, wo, active)
@@ -146,7 +146,7 @@ class LobeModel(Declared):
         Directions and densities carry no gradient: derivatives are those of the value at a fixed direction.
         """
         lobes, chances, base_chance = self._choose(ctx, si, active)
-        wi, bs, start = _above(si.wi), dr.zeros(mi.BSDFSample3f), mi.Float(0)
+        wi, bs, start = above(si.wi), dr.zeros(mi.BSDFSample3f), mi.Float(0)
         bs.eta = 1
         for n, chance in chances.items():
             chosen = sample1 >= start
@@ -190,13 +190,13 @@ class LobeModel(Declared):
 
     def _choose(self, ctx, si, active) -> tuple[Sequence[Lobe], dict[int, Any], Any]:
         """The lobes here, the chance of each that is enabled, and that of the base (None if not wanted)."""
-        lobes, wi, above = self.lobes(si, active), _above(si.wi), si.wi.z > 0
+        lobes, wi, seen = self.lobes(si, active), above(si.wi), si.wi.z > 0
         smooth = int(mi.BSDFFlags.Smooth)
         enabled = [n for n, flags in enumerate(self.flags()) if ctx.is_enabled(mi.BSDFFlags(flags & smooth), n)]
         wants_base = self._base_context(ctx) is not None
         if len(enabled) == 1 and not wants_base:
             return lobes, {enabled[0]: 1}, None
-        shares = {n: dr.select(above, lobes[n].share(wi), 0) for n in enabled}
+        shares = {n: dr.select(seen, lobes[n].share(wi), 0) for n in enabled}
         base = self.opening(si, active).share(si.wi) if wants_base else None
         scale = dr.rcp(dr.maximum(sum(shares.values()) + (base if wants_base else 0), TINY))
         return lobes, {n: share * scale for n, share in shares.items()}, base * scale if wants_base else None
@@ -209,8 +209,8 @@ class LobeModel(Declared):
         return mi.BSDFContext(ctx.mode, ctx.type_mask, component) if component >= 0 else None
 
 
-def _above(w: Any) -> Any:
-    """``w``, or the normal if ``w`` is not above the surface."""
+def above(w: Any) -> Any:
+    """``w``, or the normal if ``w`` is not above the surface: what lobes get."""
     return dr.select(w.z > 0, w, mi.Vector3f(0, 0, 1))
 
 

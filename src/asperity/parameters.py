@@ -248,7 +248,7 @@ class Axes(Texture):
 
     def one(self, name: str) -> Texture:
         """The parameter of one of these names."""
-        return Texture(self.meaning, self.default, self.low, self.high, self.unit).named(name)
+        return Texture(self.meaning, self.default, low=self.low, high=self.high, unit=self.unit).named(name)
 
     def parse(self, props: mi.Properties) -> Along:
         """The value by the names that the scene gives, or by NAME."""

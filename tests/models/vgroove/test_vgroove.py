@@ -93,7 +93,7 @@ def test_energy_by_bounces(rgb, case, traced):
     model = mi.load_dict({"type": "vgroove", "distribution": name, "alpha": alpha}).model
     si, rng = interaction_towards(0), mi.PCG32(size=N)
     numbers = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-    _, k = model.draw(si, si.wi, *numbers, True)
+    _, k = model.lobes(si, True)[0].follow(si.wi, *numbers)
     drawn = np.bincount(np.asarray(k), minlength=5)[1:] / N
     np.testing.assert_allclose(drawn[: len(traced)], traced, atol=0.001 + 4 * (0.25 / N) ** 0.5)
 
@@ -102,7 +102,7 @@ def test_energy_by_bounces(rgb, case, traced):
 def test_constant_reflectance_multiplies_by_bounces(rgb, monkeypatch, symmetric):
     """Albedo = sum_k E_k rho^k for facets that reflect rho at any angle, and weights in [rho^N, rho]."""
     rho, most = 0.5, 8
-    monkeypatch.setattr("asperity.models.vgroove.model.conductor", lambda cos, eta, k: 0 * eta + rho)
+    monkeypatch.setattr("asperity.microfacet.fresnel.conductor", lambda cos, eta, k: 0 * eta + rho)
     # A constant is no polynomial without a constant term, as reflectances are, which are 1 at grazing angles.
     for module in ("symmetric", "nonsymmetric"):
         monkeypatch.setattr(
@@ -112,7 +112,9 @@ def test_constant_reflectance_multiplies_by_bounces(rgb, monkeypatch, symmetric)
     mean, _, largest = albedo(20, material="Au", max_bounces=most, **given)
     model = mi.load_dict({"type": "vgroove", **given, "max_bounces": most}).model
     si, rng = interaction_towards(20), mi.PCG32(size=N)
-    _, k = model.draw(si, si.wi, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()), True)
+    _, k = model.lobes(si, True)[0].follow(
+        si.wi, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    )
     k = np.asarray(k)
     assert mean == pytest.approx(np.where(k <= most, rho**k, 0).mean(), abs=3e-3)  # 5 standard errors of the latter
     assert largest < rho * (1 + 1e-5)
@@ -182,7 +184,7 @@ BAD = {
     "huge": ({"alpha": 1e6}, r"alpha = 1000000.0: expected a number or texture in \[0.001, 1000\]"),
     "negative": ({"alpha_u": -0.1}, "alpha_u = -0.1"),
     "distribution": ({"distribution": "gxx"}, "distribution = 'gxx'. Did you mean 'ggx'"),
-    "exponent of GGX": ({"exponent": 3.0}, "exponent: Phong's, but distribution = 'ggx'"),
+    "exponent of GGX": ({"exponent": 3.0}, 'exponent: needs distribution = "phong"'),
     "two roughnesses": ({"distribution": "phong", "exponent": 3.0, "alpha": 0.1}, "alpha and exponent exclude"),
     "alpha twice": ({"alpha": 0.1, "alpha_u": 0.1}, "alpha and alpha_u exclude each other"),
     "rough Phong": ({"distribution": "phong", "alpha": 1.2}, r"alpha = 1.2: .*\[0.001, 1\] for Phong"),

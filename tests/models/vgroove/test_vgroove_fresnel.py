@@ -6,7 +6,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from asperity.microfacet.fresnel import conductor
 from asperity.models.vgroove import fresnel
 
 
@@ -14,11 +13,11 @@ from asperity.models.vgroove import fresnel
 def test_closed_fresnel_product(rgb, material, accuracy):
     """Against the product term by term: wrong by the fit of ln F in each of k bounces, and by float32 (1e-3)."""
     metal = mi.load_dict({"type": "vgroove", "material": material}).model.metal
-    eta, k = metal.eval(dr.zeros(mi.SurfaceInteraction3f), True)
-    logarithm = fresnel.fit(lambda cos: conductor(mi.Float(cos), eta, k))
+    once = metal.reflectance(dr.zeros(mi.SurfaceInteraction3f), True)
+    logarithm = fresnel.fit(once)
     cosines = mi.Float(np.linspace(0, 1, 1000, dtype=np.float32))
     fitted = dr.exp(sum(a * cosines ** (n + 1) for n, a in enumerate(logarithm)))
-    fit_error = np.abs(np.asarray(fitted / conductor(cosines, eta, k)) - 1).max()
+    fit_error = np.abs(np.asarray(fitted / once(cosines)) - 1).max()
     assert fit_error < accuracy
     rng, n = np.random.default_rng(5), 5000
     for count in (2, 3, 5, 12):
@@ -27,7 +26,7 @@ def test_closed_fresnel_product(rgb, material, accuracy):
         exact = 1
         for j in range(1, count + 1):
             angle = phi + (2 * j - count - 1) * b
-            exact = exact * np.asarray(conductor(mi.Float(0.9 * np.maximum(np.sin(angle), 0)), eta, k))
+            exact = exact * np.asarray(once(mi.Float(0.9 * np.maximum(np.sin(angle), 0))))
         u, w, b = (fresnel.multiples(*dr.sincos(mi.Float(x))) for x in (phi - np.pi / 2, np.pi / 2 - count * b, b))
         cos_u = [cos for _, cos in u]
         fan = fresnel.Fan(mi.UInt32(count), mi.Bool(count % 2 == 1), fresnel.numerators(u, w), cos_u, b)

@@ -11,7 +11,7 @@ import mitsuba as mi
 
 from ...conductors import Conductor
 from ...errors import ParameterError
-from ...lobes import Lifted, Lobe, LobeModel, Opening, glossy
+from ...lobes import Lifted, Lobe, LobeModel, Opening, above, glossy
 from ...microfacet.ggx import lift, normal_in_sphere_space, sample_visible_normal, smith_lambda, to_sphere
 from ...microfacet.numerics import keep, log1p
 from ...microfacet.sampling import reflect
@@ -134,4 +134,4 @@ class Rest:
 
     def reach(self, wi: Any, wo: Any) -> Any:
         """What both directions reach."""
-        return dr.select((wi.z > 0) & (wo.z > 0), self.both(self.layer.lift(wi), self.layer.lift(wo)), 0)
+        return dr.select((wi.z > 0) & (wo.z > 0), self.both(*(self.layer.lift(above(w)) for w in (wi, wo))), 0)

@@ -58,10 +58,10 @@ def lambertian(
     """
     i, o = grains.to_sphere(wi), grains.to_sphere(wo)
     stretch_o = dr.sqrt(dr.square(grains.beta_x * wo.x) + dr.square(grains.beta_y * wo.y) + dr.square(wo.z))  # |E o|
-    pair = Pair(wi, wo, Shadows(i, o), LitArcs.between(i, o))
+    pair = ShadowedPair(wi, wo, Shadows(i, o), LitArcs.between(i, o))
     ring = _closed_ring if isotropic and facet.alike_around else _summed_ring
 
-    def at_height(t: Any, captured: tuple[Grains, Pair, Facet]) -> tuple[Any, Any, Any]:
+    def at_height(t: Any, captured: tuple[Grains, ShadowedPair, Facet]) -> tuple[Any, Any, Any]:
         grains, pair, facet = captured
         h, jacobian = 1 - (1 - t) ** 3, 3 * (1 - t) ** 2  # crowded at the top, which alone is seen at grazing
         first, second, lit = ring(h, grains, pair, facet)
@@ -102,7 +102,7 @@ class Lambertian:
 
 
 @dataclass
-class Pair:
+class ShadowedPair:
     """The two directions, and what follows from them at no height yet."""
 
     wi: Any
@@ -111,7 +111,7 @@ class Pair:
     arcs: LitArcs
 
 
-def _closed_ring(h: Any, grains: Grains, pair: Pair, facet: Facet) -> tuple[Any, Any, Any]:
+def _closed_ring(h: Any, grains: Grains, pair: ShadowedPair, facet: Facet) -> tuple[Any, Any, Any]:
     """Integrals over the azimuth of (i'.m')+ (o'.m')+ T / |E m'|: the first albedo's, the second's, and without T.
 
     For beta_x = beta_y, where |E m'| depends on the height only, and facets that are alike around the grain.
@@ -121,7 +121,7 @@ def _closed_ring(h: Any, grains: Grains, pair: Pair, facet: Facet) -> tuple[Any,
     return lit - second, second, lit
 
 
-def _summed_ring(h: Any, grains: Grains, pair: Pair, facet: Facet) -> tuple[Any, Any, Any]:
+def _summed_ring(h: Any, grains: Grains, pair: ShadowedPair, facet: Facet) -> tuple[Any, Any, Any]:
     """The same for any grains and facets, by quadrature."""
     share, coat = facet.second, facet.coat
     value, second, lit = 0, 0, 0

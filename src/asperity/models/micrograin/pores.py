@@ -8,6 +8,7 @@ from typing import Any
 
 import drjit as dr
 
+from ...lobes import above
 from .grains import Grains, exposure
 from .shadows import Shadows, shadow
 
@@ -30,11 +31,11 @@ class Pores:
 
     def share(self, wi: Any) -> Any:
         """1 - tau_i, which is exact; Lucas 2024, Eq. 26 gives the pores too much."""
-        return dr.select(wi.z > 0, 1 - self.grains.visible(self.grains.lift(wi)), 1)
+        return dr.select(wi.z > 0, 1 - self.grains.visible(self.grains.lift(above(wi))), 1)
 
     def reach(self, wi: Any, wo: Any) -> Any:
         """V_p(i, o)."""
-        i, o = (self.grains.to_sphere(self.grains.lift(w)) for w in (wi, wo))
+        i, o = (self.grains.to_sphere(self.grains.lift(above(w))) for w in (wi, wo))
         one = dr.select(wi.z > 0, shadow(i, 0), 0) + dr.select(wo.z > 0, shadow(o, 0), 0)
         both = (wi.z > 0) & (wo.z > 0)
         return dr.select(both, self.both(i, o), visibility(self.grains.r, one))

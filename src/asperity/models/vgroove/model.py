@@ -71,7 +71,7 @@ class VGroove(LobeModel):
 
     def configure(self, given: set[str]) -> None:
         """Settle which of the roughnesses is used."""
-        conflict({"exponent"} & given, {"alpha", "alpha_u", "alpha_v"} & given)
+        conflict({"alpha", "alpha_u", "alpha_v"} & given, {"exponent"} & given)
         self.isotropic = self.alpha.isotropic
         if "exponent" in given:
             self.alpha = None
@@ -113,11 +113,11 @@ class VGroove(LobeModel):
 
     def lobes(self, si: Any, active: Any) -> list[Lobe]:
         """All numbers of bounces."""
-        metal = None
+        reflectance = None
         if not self.metal.mirror:
             once = self.at("metal", si, active)
-            metal = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm)
-        return [GrooveLobe(self.kind(*self._alphas(si, active)), self.symmetric, self.most, metal)]
+            reflectance = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm)
+        return [GrooveLobe(self.kind(*self._alphas(si, active)), self.symmetric, self.most, reflectance)]
 
     def _alphas(self, si: Any, active: Any) -> tuple[Any, Any]:
         if self.alpha is None:
@@ -169,7 +169,12 @@ class GrooveLobe:
         return brdf(pair, wi.z, tilts, self.most, self.reflectance)
 
     def draw(self, wi: Any, u: Any, v: Any) -> Any:
-        """Follow a ray through a groove met by chance, to where all its ways of coming there are counted.
+        """Where a ray goes that meets a groove by chance; nowhere above, if it bounces too often, and is lost."""
+        wo, k = self.follow(wi, u, v)
+        return type(wo)(wo.x, wo.y, dr.select(k <= self.most, wo.z, -1))
+
+    def follow(self, wi: Any, u: Any, v: Any) -> tuple[Any, Any]:
+        """(direction, number of bounces) of a ray that enters a groove anywhere.
 
         Grooves are met by their ground area, since all rims are at one height (Heitz and d'Eon 2014, for one bounce).
         """
@@ -187,6 +192,4 @@ class GrooveLobe:
         k = (symmetric_bounces if self.symmetric else bounces)(groove, psi, offset, self.most)
         sin, cos = dr.sincos(exit_angle(groove, psi, k))
         along = wi.y * x - wi.x * y  # across the plane of the kaleidoscope; turns round
-        # Light that bounces too often is lost: no direction above the surface.
-        up = dr.select(k <= self.most, length * cos, -1)
-        return direction(length * sin * x + along * y, length * sin * y - along * x, up)
+        return direction(length * sin * x + along * y, length * sin * y - along * x, length * cos), k
