@@ -1,1 +1,1 @@
-"""What several models share: float32-safe elementary functions, quadrature, Fresnel terms."""
+"""What several models share: distributions of normals, masking, Fresnel terms, sampling, quadrature, numerics."""

@@ -9,7 +9,7 @@ a ray meets them: L is 1, the image of R in it is 2, and so on; R itself, which 
     theta_i, theta_o             -psi, minus `exit_angle`: their angles are positive the other way round
     theta_l, theta_r, theta_v    -``tilt_l``, ``tilt_r``, `Groove.aperture`; theta_s of symmetric grooves is the tilt
     f(p)                         offset of a ray from the apex, the line through p that is parallel to the ray
-    f_a, f_2, f_k                `reach` of the images 1, 2, k; k_a is an odd image (of L), k_b an even one (of R)
+    f_a, f_k                     `reach` of the images 1, k; k_a is an odd image (of L), k_b an even one (of R)
     f_b                          `reach` of 0, and at least 0
     G                            `leaving_share`
     theta_h, theta_d             ``theta`` of `Pair`; cos theta_d = i.h is ``length`` times ``cos_delta``
@@ -20,7 +20,6 @@ Equations are theirs, with the clamps that they need.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -59,23 +58,16 @@ def reach(groove: Groove, psi: Any, m: Any) -> Any:
     return dr.select(x < dr.pi, dr.sin(x) * dr.rcp(dr.sin(tilt)), 0)
 
 
-def reach_of_all(groove: Groove, psi: Any, k: int) -> Any:
-    """F_k = min(f_1, ..., f_k): offset up to which rays reflect k times at least.
-
-    The f_m of odd m are values of one sine, those of even m of another, at steps of twice the aperture. A sine is
-    concave on (0, pi), so that the least of each is its first or its last: one of f_1, f_2, f_(k-1), f_k.
-    """
-    images = (1, 2, k - 1, k) if k > 2 else range(1, k + 1)
-    return reduce(dr.minimum, [reach(groove, psi, m) for m in images])
-
-
 def leaving_share(groove: Groove, psi: Any, k: int) -> Any:
     """G_k: share of L's area facing the light from which it leaves after k bounces; they add up to G1 (Eq. 6, 9).
 
-    Of the offsets up to f_a, those below f_b are in the shadow, and those below F_(k+1) reflect again.
+    Rays reflect k times at least up to the least of f_1, ..., f_k. That is the first or the last: images join at their
+    rims, under twice a facet's tilt, which is less than pi, so the rims are corners of a convex polygon, around which
+    offsets rise, and then fall. Of these rays, those up to f_(k+1) reflect again, and those up to f_b are in shadow.
     """
-    f_a, f_b = reach(groove, psi, 1), dr.maximum(reach(groove, psi, 0), 0)
-    leaves = dr.maximum(reach_of_all(groove, psi, k) - dr.maximum(reach_of_all(groove, psi, k + 1), f_b), 0)
+    f_a, f_k, f_next = (reach(groove, psi, m) for m in (1, k, k + 1))
+    f_b = dr.maximum(reach(groove, psi, 0), 0)
+    leaves = dr.maximum(dr.minimum(f_a, f_k) - dr.maximum(f_next, f_b), 0)
     return dr.select(f_a > 0, leaves / dr.select(f_a > 0, f_a, 1), 0)
 
 

@@ -13,7 +13,7 @@ g' = g sin l sin r being the width of the rays that leave after k bounces. C is 
     theta_l, theta_r             -l, r
     P(theta_r)                   D(r) sin^2 r / C, the density of `Tilts.sample_partner`
     ds_l / do                    J sin l / (4 l_pair cos delta), l_pair the ``length`` of the `Pair`
-    f_a, f_b, f_2, f_k           `_reaches`: f_1, max(f_0, 0), f_2; f_k and its neighbours by the reversed path
+    f_a, f_b, f_k                `_reaches`: f_1, max(f_0, 0), and f_k by the reversed path
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _single(pair: Pair, tilts: Tilts, nodes: int) -> Any:
             sin, cos = dr.sincos(low + (high - low) * node)
             stretch = dr.rsqrt(dr.square(alpha * sin) + dr.square(cos))
             r = alpha * sin * stretch, cos * stretch
-            f_0, f_1, _ = _reaches(x, l, r)
+            f_0, f_1 = _reaches(x, l, r)
             weight = tilts.density(*r) * r[0] * dr.maximum(f_1 - dr.maximum(f_0, 0), 0)
             total = total + (high - low) * alpha * dr.square(stretch) * weight
         return (total,)
@@ -185,7 +185,10 @@ class Way:
 
 @dataclass
 class Width:
-    """g', the width of the rays that leave a groove after k bounces: those up to F_k, but for f_b and F_(k+1)."""
+    """g' = min(f_1, f_k) - max(f_0, f_(k+1), 0), the width of the rays that leave a groove after k bounces.
+
+    The reason is that of `kaleidoscope.leaving_share`.
+    """
 
     odd: Any
     x: tuple  # sine and cosine
@@ -199,10 +202,9 @@ class Width:
     def __call__(self, l: tuple, r: tuple) -> Any:
         """For (sin l, cos l) and (sin r, cos r)."""
         last, other = (tuple(dr.select(self.odd, a, b) for a, b in zip(*two)) for two in ((l, r), (r, l)))
-        f_0, f_1, f_2 = _reaches(self.x, l, r)
-        f_after, f_k, f_before = _reaches(self.y, last, other)  # f_(k+1), f_k, f_(k-1)
-        all_k = dr.minimum(dr.minimum(f_1, f_2), dr.minimum(f_before, f_k))  # F_k, by `kaleidoscope.reach_of_all`
-        return dr.maximum(all_k - dr.maximum(dr.maximum(f_0, f_after), 0), 0)
+        f_0, f_1 = _reaches(self.x, l, r)
+        f_after, f_k = _reaches(self.y, last, other)
+        return dr.maximum(dr.minimum(f_1, f_k) - dr.maximum(dr.maximum(f_0, f_after), 0), 0)
 
 
 def moments(way: Way, tilts: Tilts, nodes: int, double: bool) -> tuple[Any, Any, Any]:
@@ -224,14 +226,11 @@ def moments(way: Way, tilts: Tilts, nodes: int, double: bool) -> tuple[Any, Any,
     return total, mean, square - mean * mean
 
 
-def _reaches(x: tuple, near: tuple, far: tuple) -> tuple[Any, Any, Any]:
-    """f_0, f_1, f_2 times sin l sin r, of light that meets the ``near`` facet first; arguments are sines and cosines.
+def _reaches(x: tuple, near: tuple, far: tuple) -> tuple[Any, Any]:
+    """f_0 and f_1 times sin l sin r, of light that meets the ``near`` facet first; arguments are sines and cosines.
 
-    By `kaleidoscope.reach`: -sin(near) cos(x + far), sin(far) cos(x - near), -sin(near) cos(x - 2 near - far).
-    Of the reversed path, from y, they are f_(k+1), f_k, f_(k-1), and the near facet is that of the last bounce.
+    By `kaleidoscope.reach`, -sin(near) cos(x + far) and sin(far) cos(x - near). For the reversed path, from y, whose
+    near facet is that of the last bounce, they are f_(k+1) and f_k.
     """
     (sin_x, cos_x), (sin_near, cos_near), (sin_far, cos_far) = x, near, far
-    sin, cos = sin_x * cos_near - cos_x * sin_near, cos_x * cos_near + sin_x * sin_near  # of x - near
-    sin_sum, cos_sum = sin_near * cos_far + cos_near * sin_far, cos_near * cos_far - sin_near * sin_far
-    f_0 = -sin_near * (cos_x * cos_far - sin_x * sin_far)
-    return f_0, sin_far * cos, -sin_near * (cos * cos_sum + sin * sin_sum)
+    return -sin_near * (cos_x * cos_far - sin_x * sin_far), sin_far * (cos_x * cos_near + sin_x * sin_near)
