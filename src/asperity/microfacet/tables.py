@@ -111,11 +111,11 @@ def array_types(user: str) -> tuple[Any, Any]:
 
 def _cell(x: Any, nodes: int) -> tuple[Any, Any]:
     """Number of the node at or below the coordinate ``x``, the last but one at most, and how far x is to the next."""
-    position = clamp(x, 0, 1) * (nodes - 1)
-    if not dr.is_jit_v(position):
+    if not dr.is_jit_v(x):
+        position = min(max(x, 0), 1) * (nodes - 1)
         node = min(int(position), nodes - 2) if position == position else 0
         return node, position - node
-    Float = type(position)
+    Float, position = type(x), clamp(x, 0, 1) * (nodes - 1)
     node = dr.minimum(dr.uint32_array_t(Float)(position), nodes - 2)
     return node, position - Float(node)
 
