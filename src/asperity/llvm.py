@@ -142,7 +142,7 @@ def cure() -> str:
     damaged = f"Reinstall karellen-llvm-core ({'; '.join(found)}). Or: " if (found := damages()) else ""
     return (
         f"{damaged}Install LLVM {OLDEST_WORKING} or newer, set DRJIT_LIBLLVM_PATH to its libLLVM, and start Python "
-        "again. The scalar_* variants need no LLVM."
+        "again. The scalar_* variants need no LLVM, but for tables, as of scattering: multiple."
     )
 
 

@@ -32,7 +32,7 @@ CASES = {  # description and parameters
     "smith": ({"type": "micrograin", "masking": "smith", "base": {"type": "diffuse"}}, ["tau_0.value", "beta.value"]),
     "multiple": (
         {"type": "micrograin", "scattering": "multiple", "tau_0": 0.4, "base": ROUGH},
-        ["tau_0.value", "base.alpha.value"],
+        ["beta.value", "tau_0.value", "base.alpha.value"],
     ),
     "multiple over vgroove": (
         {"type": "micrograin", "scattering": "multiple", "tau_0": 0.4, "base": {"type": "vgroove", "material": "Cu"}},

@@ -7,7 +7,7 @@ without the 8-bit weights of a GPU's own interpolation.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import prod
 from typing import Any
@@ -29,7 +29,7 @@ class Table:
     recorded loop takes a table from around it, that is part of what the loop captures (see `quadrature.accumulate`).
     """
 
-    entries: Any  # flat, channels innermost: Dr.Jit's, or a list of floats in a scalar variant
+    entries: Any  # flat, channels innermost: Dr.Jit's, or a list for coordinates that are plain floats
     shape: tuple[int, ...]  # nodes along each axis, evenly from 0 to 1; what has one node is constant along that axis
     channels: int
 
@@ -43,7 +43,11 @@ class Table:
             )
         entries = dr.ravel(_arrays(type(channels[0]))(channels))
         dr.eval(entries)
-        return cls(entries if dr.is_jit_v(mi.Float) else entries.numpy().tolist(), tuple(shape), len(channels))
+        return cls(entries, tuple(shape), len(channels))
+
+    def native(self) -> Table:
+        """The table for the active variant, in a scalar one of plain floats."""
+        return self if dr.is_jit_v(mi.Float) else replace(self, entries=self.entries.numpy().tolist())
 
     def at(self, *x: Any) -> list[Any]:
         """All channels at the coordinates ``x``, one for each axis; beyond [0, 1] the value at the end."""
@@ -107,11 +111,11 @@ def array_types(user: str) -> tuple[Any, Any]:
 
 def _cell(x: Any, nodes: int) -> tuple[Any, Any]:
     """Number of the node at or below the coordinate ``x``, the last but one at most, and how far x is to the next."""
-    position = clamp(x, 0, 1) * (nodes - 1)
-    if not dr.is_jit_v(position):
+    if not dr.is_jit_v(x):
+        position = min(max(x, 0), 1) * (nodes - 1)
         node = min(int(position), nodes - 2) if position == position else 0
         return node, position - node
-    Float = type(position)
+    Float, position = type(x), clamp(x, 0, 1) * (nodes - 1)
     node = dr.minimum(dr.uint32_array_t(Float)(position), nodes - 2)
     return node, position - Float(node)
 
