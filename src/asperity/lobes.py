@@ -162,7 +162,9 @@ class LobeModel(Declared):
         bs.pdf = dr.detach(pdf)
         return bs, _weight(value, bs.pdf)
 
-    def _sample_base(self, ctx, si, sample1, sample2, active, bs, start, chance) -> tuple[Any, Any]:
+    def _sample_base(
+        self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any, bs: Any, start: Any, chance: Any
+    ) -> tuple[Any, Any]:
         """The end of `sample`: the base, where it is chosen (beyond ``start``), or else ``bs``; and the weight."""
         on_base = active & (sample1 >= start)
         context, u = self._base_context(ctx), _rescale(sample1, start, chance)
@@ -180,7 +182,7 @@ class LobeModel(Declared):
         bs.pdf = dr.select(delta, bs.pdf * chance, pdf)
         return bs, dr.select(delta, single, _weight(value, pdf)) & active
 
-    def _stale(self, context, si, bs, active) -> Any:
+    def _stale(self, context: Any, si: Any, bs: Any, active: Any) -> Any:
         """Whether the base, which gave a weight of 0, rejected the sample and left the rest of it as it was.
 
         Mitsuba's samplers do. A black base is no rejection.
@@ -188,7 +190,7 @@ class LobeModel(Declared):
         value, pdf = self.base.eval_pdf(context, si, bs.wo, active)
         return dr.any(mi.unpolarized_spectrum(value) > 0) | (dr.abs(pdf - bs.pdf) > 0.01 * bs.pdf)
 
-    def _choose(self, ctx, si, active) -> tuple[Sequence[Lobe], dict[int, Any], Any]:
+    def _choose(self, ctx: Any, si: Any, active: Any) -> tuple[Sequence[Lobe], dict[int, Any], Any]:
         """The lobes here, the chance of each that is enabled, and that of the base (None if not wanted)."""
         lobes, wi, seen = self.lobes(si, active), above(si.wi), si.wi.z > 0
         smooth = int(mi.BSDFFlags.Smooth)
