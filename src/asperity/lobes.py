@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -35,41 +35,42 @@ def _front(kind: Any, isotropic: bool) -> int:
     return int(kind | mi.BSDFFlags.FrontSide | (0 if isotropic else mi.BSDFFlags.Anisotropic))
 
 
-class Lobe(Protocol):
+class Lobe:
     """One way to scatter light at a surface point; it holds the values of parameters there, never the model."""
 
     def share(self, wi: Any) -> Any:
-        """Share of the light from ``wi``, by which ``sample`` chooses; needs no exact sum. A lobe alone has no need."""
+        """Share of the light from ``wi``, by which ``sample`` chooses; shares need no exact sum. All, if not defined."""
+        return 1
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """(f cos_o, solid-angle density of `draw`): a spectrum or number, and a number."""
+        raise NotImplementedError
 
     def draw(self, wi: Any, u: Any, v: Any) -> Any:
         """A direction from a number and a pair of numbers in [0, 1); one from below the surface is a rejected sample.
 
         Fewer are used than given, or more: then by `microfacet.sampling`.
         """
+        raise NotImplementedError
 
 
-class Opening(Protocol):
+class Opening:
     """How much of the base is seen at a surface point, through what lies on it; here, directions may be from below."""
 
     def share(self, wi: Any) -> Any:
         """Share of what is seen from ``wi`` that is base."""
+        raise NotImplementedError
 
     def reach(self, wi: Any, wo: Any) -> Any:
         """Share of the base that both directions reach."""
+        raise NotImplementedError
 
 
 @dataclass
-class ByCosine:
+class ByCosine(Lobe):
     """A lobe that is drawn by cosine, and stands alone."""
 
     brdf: Callable[[Any, Any], Any]  # (wi, wo) -> f per steradian
-
-    def share(self, wi: Any) -> Any:
-        """All."""
-        return 1
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """(f cos_o, cos_o / pi)."""
@@ -81,7 +82,7 @@ class ByCosine:
 
 
 @dataclass
-class Lifted:
+class Lifted(Lobe):
     """A lobe that gets directions which ``lift`` keeps off the horizon, where its formulas break in float32."""
 
     lobe: Lobe
