@@ -39,7 +39,7 @@ class Lobe:
     """One way to scatter light at a surface point; it holds the values of parameters there, never the model."""
 
     def share(self, wi: Any) -> Any:
-        """Share of the light from ``wi``, by which ``sample`` chooses; shares need no exact sum. All, if not defined."""
+        """Share of the light from ``wi``, by which ``sample`` chooses; need not add up to 1. All, if not defined."""
         return 1
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
