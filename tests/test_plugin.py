@@ -32,6 +32,8 @@ def at_normal(n=1):
         "import mitsuba as mi; import asperity; mi.set_variant('scalar_rgb')",
         "from asperity.models import MODELS; import mitsuba as mi; mi.set_variant('llvm_ad_rgb')",
         "import asperity.microfacet.albedo; import mitsuba as mi; mi.set_variant('scalar_rgb')",
+        "import asperity, importlib.util; importlib.util.find_spec('mitsuba'); import mitsuba as mi; "
+        "mi.set_variant('scalar_rgb')",
         "import asperity.plugin; import mitsuba as mi; mi.set_variant('scalar_rgb')",
     ],
 )

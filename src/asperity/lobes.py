@@ -36,7 +36,7 @@ def _front(kind: Any, isotropic: bool) -> int:
 
 
 class Lobe:
-    """One way to scatter light at a surface point; it holds the values of parameters there, never the model."""
+    """One way to scatter light at a surface point; made of the values of parameters there, and kept by nobody."""
 
     def share(self, wi: Any) -> Any:
         """Share of the light from ``wi``, by which ``sample`` chooses; need not add up to 1. All, if not defined."""
@@ -103,6 +103,17 @@ class Lifted(Lobe):
         return self.lobe.draw(self.lift(wi), u, v)
 
 
+@dataclass
+class Here:
+    """The lobes at a surface point, the chance of each that is enabled, and the base's part if that is."""
+
+    lobes: Sequence[Lobe]
+    chances: dict[int, Any]
+    opening: Any = None
+    base_chance: Any = 0
+    context: Any = None  # as the base counts components
+
+
 class LobeModel(Declared):
     """A model that is the sum of lobes, and of its base if it declares one."""
 
@@ -127,56 +138,58 @@ class LobeModel(Declared):
 
     def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """(f |cos_o|, solid-angle density of `sample`)."""
-        lobes, chances, base_chance = self._choose(ctx, si, active)
-        # First, since what comes after a lobe's recorded loop cannot share with what came before.
-        reach = None if base_chance is None else self.opening(si, active).reach(si.wi, wo)
-        lit = active & (si.wi.z > 0) & (wo.z > 0)
-        wi, upper = above(si.wi), above(wo)
-        value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
-        for n, chance in chances.items():
-            lobe_value, lobe_pdf = lobes[n].eval_pdf(wi, upper)
-            value, pdf = value + mi.UnpolarizedSpectrum(lobe_value), pdf + chance * lobe_pdf
-        value, pdf = dr.select(lit, value, 0), dr.select(lit, pdf, 0)
-        if base_chance is None:
-            return value, pdf
-        base_value, base_pdf = self.base.eval_pdf(self._base_context(ctx), si, wo, active)
-        value, pdf = value + reach * mi.unpolarized_spectrum(base_value), pdf + base_chance * base_pdf
-        return dr.select(active, value, 0), dr.select(active, pdf, 0)
+        return self._eval_pdf(self._here(ctx, si, active), si, wo, active)
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> tuple[Any, Any]:
         """Choose a lobe by how much of it is seen, draw from it, and weight all lobes by the density of all.
 
         Directions and densities carry no gradient: derivatives are those of the value at a fixed direction.
         """
-        lobes, chances, base_chance = self._choose(ctx, si, active)
+        here = self._here(ctx, si, active)
         wi, bs, start = above(si.wi), None, mi.Float(0)
-        for n, chance in chances.items():
+        for n, chance in here.chances.items():
             drawn = dr.zeros(mi.BSDFSample3f)
-            drawn.wo = mi.Vector3f(lobes[n].draw(wi, _rescale(sample1, start, chance), sample2))
+            drawn.wo = mi.Vector3f(here.lobes[n].draw(wi, _rescale(sample1, start, chance), sample2))
             drawn.eta, drawn.sampled_component, drawn.sampled_type = 1, mi.UInt32(n), mi.UInt32(self.flags()[n])
             bs = drawn if bs is None else dr.select(sample1 >= start, drawn, bs)
             start = start + chance
         bs = dr.zeros(mi.BSDFSample3f) if bs is None else dr.detach(bs)
-        if base_chance is not None:
-            return self._sample_base(ctx, si, sample1, sample2, active, bs, start, dr.detach(base_chance))
-        value, pdf = self.eval_pdf(ctx, si, bs.wo, active)
+        if here.opening is not None:
+            return self._sample_base(here, si, sample1, sample2, active, bs, start)
+        value, pdf = self._eval_pdf(here, si, bs.wo, active)
         bs.pdf = dr.detach(pdf)
         return bs, _weight(value, bs.pdf)
 
+    def _eval_pdf(self, here: Here, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+        """The sum of what is enabled."""
+        # First, since what comes after a lobe's recorded loop cannot share with what came before.
+        reach = None if here.opening is None else here.opening.reach(si.wi, wo)
+        lit = active & (si.wi.z > 0) & (wo.z > 0)
+        wi, upper = above(si.wi), above(wo)
+        value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
+        for n, chance in here.chances.items():
+            lobe_value, lobe_pdf = here.lobes[n].eval_pdf(wi, upper)
+            value, pdf = value + mi.UnpolarizedSpectrum(lobe_value), pdf + chance * lobe_pdf
+        value, pdf = dr.select(lit, value, 0), dr.select(lit, pdf, 0)
+        if here.opening is None:
+            return value, pdf
+        base_value, base_pdf = self.base.eval_pdf(here.context, si, wo, active)
+        value, pdf = value + reach * mi.unpolarized_spectrum(base_value), pdf + here.base_chance * base_pdf
+        return dr.select(active, value, 0), dr.select(active, pdf, 0)
+
     def _sample_base(
-        self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any, bs: Any, start: Any, chance: Any
+        self, here: Here, si: Any, sample1: Any, sample2: Any, active: Any, bs: Any, start: Any
     ) -> tuple[Any, Any]:
         """The end of `sample`: the base, where it is chosen (beyond ``start``), or else ``bs``; and the weight."""
-        on_base = active & (sample1 >= start)
-        context, u = self._base_context(ctx), _rescale(sample1, start, chance)
-        base, base_weight = self.base.sample(context, si, u, sample2, on_base)
+        on_base, chance = active & (sample1 >= start), dr.detach(here.base_chance)
+        base, base_weight = self.base.sample(here.context, si, _rescale(sample1, start, chance), sample2, on_base)
         base_weight = mi.unpolarized_spectrum(base_weight)
         base.sampled_component += len(self.flags())
         bs = dr.detach(dr.select(on_base, base, bs))
-        reach = self.opening(si, active).reach(si.wi, bs.wo)
+        reach = here.opening.reach(si.wi, bs.wo)
         # Lobes end at the horizon, where a transmitting base may well have a density.
-        value, pdf = self.eval_pdf(ctx, si, bs.wo, active & (on_base | (bs.wo.z > 0)))
-        rejected = on_base & dr.all(base_weight == 0) & self._stale(context, si, bs, on_base)
+        value, pdf = self._eval_pdf(here, si, bs.wo, active & (on_base | (bs.wo.z > 0)))
+        rejected = on_base & dr.all(base_weight == 0) & self._stale(here.context, si, bs, on_base)
         pdf = dr.detach(dr.select(rejected, 0, pdf))
         # A mirror, clear glass, or a hole in the base: no other lobe reaches its direction, and eval_pdf is zero there.
         delta = on_base & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
@@ -192,18 +205,18 @@ class LobeModel(Declared):
         value, pdf = self.base.eval_pdf(context, si, bs.wo, active)
         return dr.any(mi.unpolarized_spectrum(value) > 0) | (dr.abs(pdf - bs.pdf) > 0.01 * bs.pdf)
 
-    def _choose(self, ctx: Any, si: Any, active: Any) -> tuple[Sequence[Lobe], dict[int, Any], Any]:
-        """The lobes here, the chance of each that is enabled, and that of the base (None if not wanted)."""
-        lobes, wi, seen = self.lobes(si, active), above(si.wi), si.wi.z > 0
-        smooth = int(mi.BSDFFlags.Smooth)
+    def _here(self, ctx: Any, si: Any, active: Any) -> Here:
+        """What is at a surface point, and enabled."""
+        lobes, wi, seen, smooth = self.lobes(si, active), above(si.wi), si.wi.z > 0, int(mi.BSDFFlags.Smooth)
         enabled = [n for n, flags in enumerate(self.flags()) if ctx.is_enabled(mi.BSDFFlags(flags & smooth), n)]
-        wants_base = self._base_context(ctx) is not None
-        if len(enabled) == 1 and not wants_base:
-            return lobes, {enabled[0]: 1}, None
+        context = self._base_context(ctx)
+        if context is None and len(enabled) == 1:
+            return Here(lobes, {enabled[0]: 1})
+        opening = None if context is None else self.opening(si, active)
         shares = {n: dr.select(seen, lobes[n].share(wi), 0) for n in enabled}
-        base = self.opening(si, active).share(si.wi) if wants_base else None
-        scale = dr.rcp(dr.maximum(sum(shares.values()) + (base if wants_base else 0), TINY))
-        return lobes, {n: share * scale for n, share in shares.items()}, base * scale if wants_base else None
+        base = 0 if opening is None else opening.share(si.wi)
+        scale = dr.rcp(dr.maximum(sum(shares.values()) + base, TINY))
+        return Here(lobes, {n: share * scale for n, share in shares.items()}, opening, base * scale, context)
 
     def _base_context(self, ctx: Any) -> Any:
         """The context as the base counts components, or None if the base is not there or not wanted."""

@@ -33,17 +33,19 @@ def _switched(_old: str | None, _new: str) -> None:
 
 
 class _AfterMitsuba(importlib.abc.MetaPathFinder):
-    """Steps in once, when somebody imports ``mitsuba``, and lets it load as usual."""
+    """Steps in when somebody imports ``mitsuba``, not when somebody only looks for it, and lets it load as usual."""
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> Any:
         if name != "mitsuba":
             return None
         sys.meta_path.remove(self)
         spec = importlib.util.find_spec(name)
+        sys.meta_path.insert(0, self)
         if spec is not None and spec.loader is not None:
             load = spec.loader.exec_module
 
             def load_and_follow(module: Any) -> None:
+                sys.meta_path.remove(self)
                 load(module)
                 follow()
 

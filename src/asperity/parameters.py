@@ -273,7 +273,7 @@ class Axes(Texture):
 
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """The same for all names."""
-        return dict.fromkeys(self.names(), (self.low, self.high))
+        return {name: both for both in super().ranges().values() for name in self.names()}
 
     def usual(self) -> Mapping[str, Usual]:
         """The same for all names."""
@@ -454,8 +454,13 @@ class Declared:
     @classmethod
     def declarations(cls) -> list[Parameter]:
         """The parameters, in the order in which class bodies name them; those of base classes come first."""
-        found = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
-        return [value for value in found.values() if isinstance(value, Parameter)]
+        found: dict[str, Parameter] = {}
+        for name, value in (pair for base in reversed(cls.__mro__) for pair in vars(base).items()):
+            if isinstance(value, Parameter):
+                found[name] = value
+            else:
+                found.pop(name, None)
+        return list(found.values())
 
     @classmethod
     def defaults(cls) -> dict[str, Any]:
@@ -508,6 +513,8 @@ class Declared:
         """The explicit microgeometry that a scene's description of this model stands for; raises ParameterError."""
         from .loading import load
 
+        if cls.geometry is None:
+            raise ParameterError(f"{cls.__name__} has no microgeometry to measure.")
         load(description)  # complains of what is wrong with it
         return cls.geometry.of(cls.defaults() | description, set(description))
 
@@ -545,10 +552,10 @@ def varies(texture: Any) -> bool:
     return texture.is_spatially_varying() or not texture.class_name().endswith("Spectrum")
 
 
-def constant(name: str, texture: Any) -> Any:
+def constant(name: str, texture: Any, why: str = "") -> Any:
     """The number of a texture, with its derivatives; raises ParameterError, about ``name``, if it varies."""
     if varies(texture):
-        raise ParameterError(f"{name}: a texture, where one number for the whole surface is expected.")
+        raise ParameterError(f"{name}: a texture, where one number for the whole surface is expected{why}.")
     return texture.eval_1(dr.zeros(mi.SurfaceInteraction3f), True)
 
 

@@ -18,8 +18,6 @@ from .microfacet.quadrature import RULES, rule
 from .models import MODELS, PHASES, TEXTURES
 from .parameters import Usual
 
-ALBEDO_SAMPLES = 256
-
 
 def register() -> None:
     """Register every model in the active variant."""
@@ -105,7 +103,7 @@ def _bsdf(model_class: Any, variant: str) -> type:
             # Mitsuba's default, pi times the value at normal incidence, is right for Lambertian BSDFs only.
             if hasattr(self.model, "directional_albedo"):
                 return _depolarise(self.model.directional_albedo(si, active))
-            return _depolarise(directional_albedo(self.model.sample, si, active, ALBEDO_SAMPLES))
+            return _depolarise(directional_albedo(self.model.sample, si, active))
 
     return BSDF
 

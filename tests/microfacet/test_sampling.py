@@ -20,11 +20,25 @@ def numbers(count):
 
 @pytest.mark.parametrize("number", [0.25, llvm.Float(0.25), llvm.Float64(0.25)], ids=["float", "float32", "float64"])
 def test_directions_of_all_numbers(number):
-    """At u = v = 1/4: halfway up, towards y."""
-    root = np.sqrt(0.75)
-    for w, z in ((sampling.cosine_hemisphere(number, number), root), (sampling.spherical(number, number), 0.25)):
-        assert np.ravel(w) == pytest.approx([0, np.sqrt(1 - z * z), z], abs=1e-7)
+    """At u = v = 1/4."""
+    diagonal = -np.sqrt(1 / 8)
+    for w, expected in (
+        (sampling.cosine_hemisphere(number, number), [diagonal, diagonal, np.sqrt(0.75)]),
+        (sampling.spherical(number, number), [0, np.sqrt(15) / 4, 0.25]),
+    ):
+        assert np.ravel(w) == pytest.approx(expected, abs=1e-7)
         assert type(w.x) is type(number)
+
+
+def test_the_cosine_hemisphere_is_mitsubas(rgb):
+    """Its middle and its edges included, so that stratified samplers are worth the same."""
+    u, v = (np.r_[x, 0, 0, 0.5, 0.5].astype(np.float32) for x in np.random.default_rng(3).random((2, 10_000)))
+    v[-2] = 0
+    ours, theirs = (
+        sampling.cosine_hemisphere(mi.Float(u), mi.Float(v)),
+        mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v)),
+    )
+    np.testing.assert_allclose(np.array(ours), np.array(theirs), atol=2e-6)
 
 
 def test_cosine_hemisphere():

@@ -11,12 +11,14 @@ import mitsuba as mi
 from .numerics import clamp
 from .quadrature import accumulate
 
+SAMPLES = 256
+"""Of `directional_albedo`."""
 FEW = 16
 """Samples of `upright_albedo`."""
 
 
 def directional_albedo(
-    sample: Callable, si: mi.SurfaceInteraction3f, active: Any, samples: int, copies: bool = False
+    sample: Callable, si: mi.SurfaceInteraction3f, active: Any, samples: int = SAMPLES, copies: bool = False
 ) -> Any:
     """Reflected and transmitted share of the light from ``si.wi``: the mean weight of the same samples every time.
 

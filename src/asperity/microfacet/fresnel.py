@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-TINY = 1e-24
+LEAST = 1e-24
 """Keeps the root's modulus off 0, at the critical angle without absorption; it shows at cosines below 3e-6 alone."""
 
 
@@ -55,10 +55,10 @@ def conductor(cos: Any, eta: Any, k: Any) -> Any:
     # eta^2 - sin^2 in two ways: one keeps the digits of a small eta, the other those of a small cosine.
     real = dr.select(eta < 0.7, eta * eta - sin2, (eta - 1) * (eta + 1) + cos2) - k * k
     half = eta * k
-    larger = dr.sqrt((dr.sqrt(real * real + 4 * half * half + TINY) + dr.abs(real)) / 2)
+    larger = dr.sqrt((dr.sqrt(real * real + 4 * half * half + LEAST) + dr.abs(real)) / 2)
     smaller = half / larger
     a, b = dr.select(real > 0, larger, smaller), dr.select(real > 0, smaller, larger)
     b2, a_cos = b * b, a * cos
     perpendicular = (dr.square(a - cos) + b2) / (dr.square(a + cos) + b2)
-    parallel = (dr.square(a_cos - sin2) + b2 * cos2) / (dr.square(a_cos + sin2) + b2 * cos2 + TINY)
+    parallel = (dr.square(a_cos - sin2) + b2 * cos2) / (dr.square(a_cos + sin2) + b2 * cos2 + LEAST)
     return perpendicular * (1 + parallel) / 2

@@ -10,6 +10,8 @@ from typing import Any
 
 import drjit as dr
 
+from .numerics import SHORTEST
+
 GRAZING = 1e-3
 """Smallest cosine in sphere space: shadows grow as its inverse, beyond what float32 resolves."""
 
@@ -22,14 +24,14 @@ def to_sphere(w: Any, beta_x: Any, beta_y: Any) -> Any:
 
 def lift(w: Any, beta_x: Any, beta_y: Any) -> Any:
     """``w`` raised where it needs to be, so that its cosine in sphere space is at least `GRAZING`."""
-    tangent = dr.sqrt(dr.square(beta_x * w.x) + dr.square(beta_y * w.y) + 1e-14)
+    tangent = dr.sqrt(dr.square(beta_x * w.x) + dr.square(beta_y * w.y) + SHORTEST)
     raised = type(w)(w.x, w.y, dr.maximum(w.z, GRAZING * tangent))
     return raised * dr.rsqrt(dr.squared_norm(raised))
 
 
 def inclination(w: Any) -> tuple[Any, Any]:
     """(sine, cosine) of the angle between ``w`` and the normal, safe at normal and at grazing incidence."""
-    return dr.sqrt(w.x * w.x + w.y * w.y + 1e-14), w.z
+    return dr.sqrt(w.x * w.x + w.y * w.y + SHORTEST), w.z
 
 
 def normal_in_sphere_space(m: Any, beta_x: Any, beta_y: Any) -> tuple[Any, Any]:

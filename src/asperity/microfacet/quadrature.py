@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .distributions import Distribution
 
 RULES = (4, 5, 6, 8, 12, 16)
-"""Numbers of nodes that models use in recorded loops."""
+"""Numbers of nodes that models use in recorded loops: add yours, or `dr.freeze` does not find them."""
 
 
 @cache

@@ -31,9 +31,17 @@ def spherical(cos: Any, u: Any) -> Any:
 
 
 def cosine_hemisphere(u: Any, v: Any) -> Any:
-    """A direction above the horizon with density cos / pi."""
-    radius, (sin, cos) = dr.sqrt(u), dr.sincos(2 * dr.pi * v)
-    return direction(radius * cos, radius * sin, dr.safe_sqrt(1 - u))
+    """A direction above the horizon with density cos / pi.
+
+    Squares become sectors of the disc below it, and neighbours stay neighbours: strata keep their use (Shirley and
+    Chiu 1997).
+    """
+    x, y = 2 * u - 1, 2 * v - 1
+    upright = dr.abs(x) < dr.abs(y)
+    radius, across = dr.select(upright, y, x), dr.select(upright, x, y)
+    turn = dr.pi / 4 * across / dr.select(radius == 0, 1, radius)
+    sin, cos = dr.sincos(dr.select(upright, dr.pi / 2 - turn, turn))
+    return direction(radius * cos, radius * sin, dr.safe_sqrt(1 - radius * radius))
 
 
 def reflect(w: Any, m: Any) -> Any:

@@ -36,7 +36,7 @@ def with_microgeometry() -> list[str]:
 
 def microgeometry(description: dict[str, Any]) -> Any:
     """The explicit microgeometry that a scene's description of a model stands for; raises ParameterError."""
-    if (name := description["type"]) not in with_microgeometry():
+    if (name := description.get("type")) not in with_microgeometry():
         known = ", ".join(with_microgeometry())
         raise ParameterError(f"{name!r} has no microgeometry to measure. Those that have: {known}.")
     return MODELS[name].microgeometry(description)

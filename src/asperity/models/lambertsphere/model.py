@@ -36,13 +36,10 @@ class HalfSpace(LobeModel):
     reflectance = Colour("Bond albedo of the material, as seen in uniform light", 0.5)
     albedo = Colour("albedo of the particles, instead of reflectance")
 
+    brdf: Callable[[Directions, Any], Any]  # (directions, s) -> f_r per steradian, a spectrum
     once: Callable[[Any], Any]  # (cosine between propagation directions) -> density per steradian, to draw by
     draw_once: Callable[[Any], Any]  # (uniform number) -> such a cosine
     root: Callable[[Any], Any]  # (Bond albedo) -> s = sqrt(1 - albedo of the particles)
-
-    def brdf(self, pair: Directions, s: Any) -> Any:
-        """f_r per steradian, a spectrum."""
-        raise NotImplementedError
 
     def configure(self, given: set[str]) -> None:
         """Settle which of the albedos is used."""
@@ -116,15 +113,16 @@ class LambertSphere(HalfSpace):
         """With the published fits, the published map."""
         return (transport.published_root if self.variant == "published" else transport.root)(bond)
 
-    def brdf(self, pair: Directions, s: Any) -> Any:
-        """By the function of the variant's name."""
-        return getattr(transport, self.variant)(pair, s)
+    @property
+    def brdf(self) -> Callable[[Directions, Any], Any]:  # type: ignore[override]
+        """The function of the variant's name."""
+        return getattr(transport, self.variant)
 
     def directional_albedo(self, si: Any, active: Any) -> Any:
         """Directional albedo, in closed form where there is one."""
         if self.variant == "accurate":
             return transport.directional_albedo(si.wi.z, self.s(si, active)) & (si.wi.z > 0)
-        return directional_albedo(self.sample, si, active, 256)
+        return directional_albedo(self.sample, si, active)
 
 
 class Chandrasekhar(HalfSpace):

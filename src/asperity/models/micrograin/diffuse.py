@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 
 from ...lobes import Lobe
-from ...microfacet.numerics import heading
+from ...microfacet.numerics import SHORTEST, heading
 from ...microfacet.quadrature import gauss_legendre, integrate
 from ...microfacet.sampling import about, cosine_hemisphere, split
 from .grains import Grains, exposure
@@ -160,7 +160,7 @@ class LitArcs:
         x, y = heading(i.x, i.y)
         cross = x * o.y - y * o.x
         angle = dr.atan2(dr.abs(cross), x * o.x + y * o.y + 1e-12)  # squared in the derivative
-        radius_i, radius_o = (dr.sqrt(w.x * w.x + w.y * w.y + 1e-14) for w in (i, o))
+        radius_i, radius_o = (dr.sqrt(w.x * w.x + w.y * w.y + SHORTEST) for w in (i, o))
         sin, cos = dr.sincos(angle)
         return cls(i, o, radius_i, radius_o, (x, y), dr.select(cross < 0, type(cross)(-1), 1), angle, sin, cos)
 

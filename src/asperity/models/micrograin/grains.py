@@ -120,17 +120,17 @@ def _visible_height(r: Any, sin: Any, cos: Any, u: Any) -> Any:
 
     def area(alpha: Any, sin_alpha: Any, cos_alpha: Any) -> tuple[Any, Any, Any]:  # and its derivatives by alpha
         h = sin * cos_alpha
-        gamma = dr.atan2(sin_alpha, cos * cos_alpha + 1e-20)
+        gamma = dr.atan2(sin_alpha, cos * cos_alpha + TINY)
         value = (dr.pi - gamma) * (1 - h * h) + (alpha - h * sin * sin_alpha) / cos
         # d sigma/dh = -width / cos, where width is the ring at height h as seen along w: int (w.m')+ over the azimuth.
         width = 2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha)
-        gamma_slope = cos / (sin_alpha * sin_alpha + cos * cos * cos_alpha * cos_alpha + 1e-20)
+        gamma_slope = cos / (sin_alpha * sin_alpha + cos * cos * cos_alpha * cos_alpha + TINY)
         width_slope = 2 * (sin * cos_alpha - cos * sin * sin_alpha * (dr.pi - gamma) - cos * h * gamma_slope)
         return value, sin / cos * width * sin_alpha, sin / cos * (width_slope * sin_alpha + width * cos_alpha)
 
     q = dr.clip((sigma - unshaded) / dr.maximum(whole - unshaded, 1e-12), 0, 1)
     # Of q, alpha is a square root at normal and a cube root at grazing incidence, where q is small.
-    start = dr.pi / 2 * (cos * dr.sqrt(q) + (1 - cos) * dr.power(q + 1e-20, 1 / 3))
+    start = dr.pi / 2 * (cos * dr.sqrt(q) + (1 - cos) * dr.power(q + TINY, 1 / 3))
     _, cos_alpha = _invert(area, sigma, start, dr.pi / 2)
     return dr.select(sigma <= unshaded, dr.safe_sqrt(1 - sigma / dr.pi), sin * dr.maximum(cos_alpha, 0))
 
@@ -163,7 +163,7 @@ def _invert(f: Callable[[Any, Any, Any], tuple[Any, Any, Any]], value: Any, x: A
     for _ in range(2):
         found, slope, bend = f(x, sin, cos)
         error = found - value
-        step = -2 * error * slope / dr.maximum(2 * slope * slope - error * bend, 1e-20)
+        step = -2 * error * slope / dr.maximum(2 * slope * slope - error * bend, TINY)
         turned = dr.clip(x + step, 0, high)
         sin, cos = _turn(sin, cos, turned - x)
         x = turned

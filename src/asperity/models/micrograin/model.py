@@ -117,7 +117,8 @@ class Micrograin(LobeModel):
         """Bring the table of losses up to date, which is made from beta."""
         if self.scattering == "multiple":
             make = partial(LossTable.made, self.grains != "metal", SHADED[self.masking])
-            self.losses.update(make, *(constant(name, texture) for name, texture in self.beta.textures.items()))
+            why = ': scattering = "multiple" makes a table from it; tau_0 may be a texture'
+            self.losses.update(make, *(constant(name, texture, why) for name, texture in self.beta.textures.items()))
 
     def flags(self) -> list[int]:
         """A glossy lobe but for diffuse grains, a diffuse one but for metal, and that of ``multiple``."""

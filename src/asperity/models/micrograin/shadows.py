@@ -33,6 +33,7 @@ from typing import Any
 import drjit as dr
 
 from ...microfacet.ggx import inclination
+from ...microfacet.numerics import TINY
 
 
 def silhouette(sin: Any, cos: Any, h: Any) -> tuple[Any, Any, Any]:
@@ -42,14 +43,14 @@ def silhouette(sin: Any, cos: Any, h: Any) -> tuple[Any, Any, Any]:
     """
     cos_alpha = dr.minimum(h / sin, 1)
     sin_alpha = _sine(cos_alpha)
-    return cos_alpha, sin_alpha, dr.atan2(sin_alpha, cos * cos_alpha + 1e-20)
+    return cos_alpha, sin_alpha, dr.atan2(sin_alpha, cos * cos_alpha + TINY)
 
 
 def shadow(w: Any, h: Any) -> Any:
     """Area sigma_s of the shadow along ``w`` on the plane at height ``h`` (Lucas 2024, Appendix A)."""
     sin, cos = inclination(w)
     cos_alpha, sin_alpha, gamma = silhouette(sin, cos, h)
-    alpha = dr.atan2(sin_alpha, cos_alpha + 1e-20)
+    alpha = dr.atan2(sin_alpha, cos_alpha + TINY)
     return dr.maximum(_beyond_disc(h, sin, cos, alpha, sin_alpha, gamma), 0)
 
 
@@ -149,4 +150,4 @@ def _sine(cos: Any) -> Any:
 
 def _sum_of_angles(x: Any, y: Any, u: Any, v: Any) -> Any:
     """Sum of the polar angles of (x, y) and (u, v), if that is in [0, pi]."""
-    return dr.atan2(dr.maximum(x * v + y * u, 0), x * u - y * v + 1e-20)
+    return dr.atan2(dr.maximum(x * v + y * u, 0), x * u - y * v + TINY)
