@@ -128,6 +128,8 @@ class LobeModel(Declared):
     def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
         """(f |cos_o|, solid-angle density of `sample`)."""
         lobes, chances, base_chance = self._choose(ctx, si, active)
+        # First, since what comes after a lobe's recorded loop cannot share with what came before.
+        reach = None if base_chance is None else self.opening(si, active).reach(si.wi, wo)
         lit = active & (si.wi.z > 0) & (wo.z > 0)
         wi, upper = above(si.wi), above(wo)
         value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
@@ -138,8 +140,8 @@ class LobeModel(Declared):
         if base_chance is None:
             return value, pdf
         base_value, base_pdf = self.base.eval_pdf(self._base_context(ctx), si, wo, active)
-        value = value + self.opening(si, active).reach(si.wi, wo) * mi.unpolarized_spectrum(base_value)
-        return dr.select(active, value, 0), dr.select(active, pdf + base_chance * base_pdf, 0)
+        value, pdf = value + reach * mi.unpolarized_spectrum(base_value), pdf + base_chance * base_pdf
+        return dr.select(active, value, 0), dr.select(active, pdf, 0)
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> tuple[Any, Any]:
         """Choose a lobe by how much of it is seen, draw from it, and weight all lobes by the density of all.
@@ -147,16 +149,14 @@ class LobeModel(Declared):
         Directions and densities carry no gradient: derivatives are those of the value at a fixed direction.
         """
         lobes, chances, base_chance = self._choose(ctx, si, active)
-        wi, bs, start = above(si.wi), dr.zeros(mi.BSDFSample3f), mi.Float(0)
-        bs.eta = 1
+        wi, bs, start = above(si.wi), None, mi.Float(0)
         for n, chance in chances.items():
-            chosen = sample1 >= start
-            wo = mi.Vector3f(lobes[n].draw(wi, _rescale(sample1, start, chance), sample2))
-            bs.wo = dr.select(chosen, wo, bs.wo)
-            bs.sampled_component = dr.select(chosen, mi.UInt32(n), bs.sampled_component)
-            bs.sampled_type = dr.select(chosen, mi.UInt32(self.flags()[n]), bs.sampled_type)
+            drawn = dr.zeros(mi.BSDFSample3f)
+            drawn.wo = mi.Vector3f(lobes[n].draw(wi, _rescale(sample1, start, chance), sample2))
+            drawn.eta, drawn.sampled_component, drawn.sampled_type = 1, mi.UInt32(n), mi.UInt32(self.flags()[n])
+            bs = drawn if bs is None else dr.select(sample1 >= start, drawn, bs)
             start = start + chance
-        bs = dr.detach(bs)
+        bs = dr.zeros(mi.BSDFSample3f) if bs is None else dr.detach(bs)
         if base_chance is not None:
             return self._sample_base(ctx, si, sample1, sample2, active, bs, start, dr.detach(base_chance))
         value, pdf = self.eval_pdf(ctx, si, bs.wo, active)
@@ -173,13 +173,14 @@ class LobeModel(Declared):
         base_weight = mi.unpolarized_spectrum(base_weight)
         base.sampled_component += len(self.flags())
         bs = dr.detach(dr.select(on_base, base, bs))
+        reach = self.opening(si, active).reach(si.wi, bs.wo)
         # Lobes end at the horizon, where a transmitting base may well have a density.
         value, pdf = self.eval_pdf(ctx, si, bs.wo, active & (on_base | (bs.wo.z > 0)))
         rejected = on_base & dr.all(base_weight == 0) & self._stale(context, si, bs, on_base)
         pdf = dr.detach(dr.select(rejected, 0, pdf))
         # A mirror, clear glass, or a hole in the base: no other lobe reaches its direction, and eval_pdf is zero there.
         delta = on_base & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-        single = base_weight * self.opening(si, active).reach(si.wi, bs.wo) / dr.maximum(chance, TINY)
+        single = base_weight * reach / dr.maximum(chance, TINY)
         bs.pdf = dr.select(delta, bs.pdf * chance, pdf)
         return bs, dr.select(delta, single, _weight(value, pdf)) & active
 

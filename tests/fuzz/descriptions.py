@@ -82,6 +82,10 @@ def material(rng: Rng, depth: int = 0) -> Description:
             found[parameter.name] = colour(rng)
         elif isinstance(parameter, parameters.Ior):
             found[parameter.name] = one_of(rng, "bk7", "water", 1.0, 1.5, float(rng.uniform(0.5, 5)))
+        elif isinstance(parameter, parameters.Axes):
+            both = parameter.names()[1:]
+            for axis in one_of(rng, [parameter.name], both[:1], both):
+                found[axis] = texture(rng, parameter)
         elif isinstance(parameter, parameters.Texture):
             found[parameter.name] = texture(rng, parameter)
         elif isinstance(parameter, parameters.Choice):

@@ -130,7 +130,7 @@ class Rest(Opening):
 
     def share(self, wi: Any) -> Any:
         """What the normal and ``wi`` both reach."""
-        return self.reach(wi, type(wi)(0, 0, 1))
+        return dr.select(wi.z > 0, self.both(self.layer.lift(above(wi)), type(wi)(0, 0, 1)), 0)
 
     def reach(self, wi: Any, wo: Any) -> Any:
         """What both directions reach."""
