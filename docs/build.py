@@ -15,7 +15,7 @@ STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", 
 
 def table(model) -> str:
     """A model's parameters, in Markdown."""
-    lines = ["| name | value | default | allowed | unit | meaning |", "|---|---|---|---|---|---|"]
+    lines = ["| name | value | default | allowed | usual | unit | meaning |", "|---|---|---|---|---|---|---|"]
     lines += ["| `" + row.name + "` | " + " | ".join(row[1:]) + " |" for row in model.rows()]
     return "\n".join(lines)
 

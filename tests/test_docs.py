@@ -1,12 +1,16 @@
 """The documentation says what the code says."""
 
+import ast
 import importlib.util
 import re
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "asperity"
+TOP = {path.stem for path in PACKAGE.iterdir()}
 spec = importlib.util.spec_from_file_location("build", ROOT / "docs" / "build.py")
 build = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(build)
@@ -31,3 +35,70 @@ def test_readme_begins_with_a_picture_and_two_commands():
     assert [len(block.strip().splitlines()) for block in commands] == [1, 1]
     picture = re.search(r"!\[.*?\]\((.*?)\)", readme)
     assert picture.start() < readme.index("```sh") and (ROOT / picture[1]).is_file()
+
+
+def blocks(page):
+    """What stands between fences in a page, with its language."""
+    return re.findall(r"^```(\w*)\n(.*?)^```$", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+
+
+def tree():
+    """The paths that the architecture page names, with what it says of each."""
+    lines = next(text for _, text in blocks("docs/architecture.md") if text.startswith("src/")).splitlines()
+    folders, found = [], {}
+    for line in lines:
+        depth, (name, meaning) = (len(line) - len(line.lstrip())) // 2, line.split(maxsplit=1)
+        folders[depth:] = [name.strip("/")]
+        found[ROOT.joinpath(*folders)] = meaning
+    return found
+
+
+def test_every_file_stands_in_the_tree_of_the_architecture_page():
+    """Folders stand for their __init__.py; those without Python, for all that they hold."""
+    named = tree()
+    files = {path for path in PACKAGE.rglob("*") if path.is_file() and path.suffix != ".pyc"}
+    holders = {path.parent for path in files if path.suffix == ".py"}
+    missing = {path if path.parent in holders and path.name != "__init__.py" else path.parent for path in files}
+    assert missing - named.keys() == set()
+    assert {path for path in named if not path.exists()} == set()
+
+
+def arrows():
+    """Which parts of the package import which, in functions too: files at its top, and folders."""
+    found = defaultdict(set)
+    for path in PACKAGE.rglob("*.py"):
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom):
+                package = parts[: len(parts) - node.level] if node.level else ()
+                names = [[*package, *(node.module or "").split("."), name.name] for name in node.names]
+            else:
+                names = [name.name.split(".") for name in getattr(node, "names", ()) if isinstance(node, ast.Import)]
+            for name in ([part for part in name if part] for name in names):
+                if name[0] == "asperity":
+                    found[parts[1]].add(next((part for part in name[1:2] if part in TOP), "__init__"))
+    return {part: targets - {part} for part, targets in found.items()}
+
+
+def test_arrows_are_those_of_the_architecture_page_and_point_down():
+    text = next(text for _, text in blocks("docs/architecture.md") if "->" in text)
+    drawn = {part: set(re.findall(r"\w+", targets)) for part, targets in re.findall(r"(\w+) +->(.*)", text)}
+    floors, found = list(drawn), arrows()
+    assert drawn == {part: found.get(part, set()) for part in floors} and found.keys() <= drawn.keys()
+    assert [(a, b) for a in floors for b in drawn[a] if floors.index(b) <= floors.index(a)] == []
+
+
+def test_the_model_in_contributing_works(rgb, monkeypatch):
+    """It is registered as any other, and obeys what the lab asks of any."""
+    from asperity import models as registry
+    from asperity import plugin
+    from asperity.lab import checks
+
+    (example,) = (text for language, text in blocks("CONTRIBUTING.md") if language == "python")
+    names = {"__name__": "minnaert"}
+    exec(example, names)
+    monkeypatch.setitem(registry.MODELS, "minnaert", names["Minnaert"])
+    plugin.register()
+    only = ("chi2", "weight", "reciprocity", "bounds", "energy", "gradients")
+    found = checks.check({"type": "minnaert"}, only=only, significance=1e-4)
+    assert [(result.name, result.measured) for result in found if not result.passed] == []

@@ -1,6 +1,6 @@
 """How the tables of `transport` are made, from an exact solution: ``python -m asperity.models.lambertsphere.fit``.
 
-Prints them, ready to paste, with their errors and with those of the digits in transport.py. Needs a few seconds;
+Prints them, ready to paste, with their errors and with those of the digits in transport.py. Needs half a minute;
 nothing imports this module when rendering.
 
 The digits in transport.py are not those printed: they are of an earlier fit of the same forms, whose script is lost.
