@@ -41,7 +41,7 @@ def cosine_hemisphere(u: Any, v: Any) -> Any:
     radius, across = dr.select(upright, y, x), dr.select(upright, x, y)
     turn = dr.pi / 4 * across / dr.select(radius == 0, 1, radius)
     sin, cos = dr.sincos(dr.select(upright, dr.pi / 2 - turn, turn))
-    return direction(radius * cos, radius * sin, dr.safe_sqrt(1 - radius * radius))
+    return direction(radius * cos, radius * sin, dr.safe_sqrt((1 - radius) * (1 + radius)))
 
 
 def reflect(w: Any, m: Any) -> Any:

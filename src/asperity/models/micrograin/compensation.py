@@ -68,7 +68,8 @@ SPARSEST = 1e-4
 SPARSE = 0.03
 """Filling factor below which derivatives are taken at fixed directions. Those that move with beta miss that light which
 crosses the horizon is lost at once, as it is among few grains: at tau_0 = 0.002, 13 % of the BSDF's derivative. Among
-more, they are those of the table, while fixed ones differ by its noise: both are right to 1 or 2 %, near tau_0 = 0 to 4 %."""
+more, they are those of the table, while fixed ones differ by its noise: both are right to 1 or 2 %,
+4 % next to none."""
 
 
 class Loss(NamedTuple):
