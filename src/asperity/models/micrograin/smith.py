@@ -78,7 +78,7 @@ class SmithSpecular(Lobe):
         return self.grains.visible(wi) * (1 - self.material.diffuse_part(wi.z))
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
-        """w+ D G F / (4 cos_i) (Lucas 2024, Eq. 1 and 5), and the density of visible normals over 4 i.m."""
+        """w+ D G F / (4 cos_i) (Lucas 2024, Eq. 1 and 2), and the density of visible normals over 4 i.m."""
         grains, m = self.grains, dr.normalize(wi + wo)
         i, o = grains.to_sphere(wi), grains.to_sphere(wo)
         h, d_ggx = normal_in_sphere_space(m, grains.beta_x, grains.beta_y)
@@ -105,7 +105,7 @@ class SmithLambertian(Lobe):
         return self.grains.visible(wi) * self.material.diffuse_part(wi.z)
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
-        """w+ T K_d cos_o / pi (Lucas 2024, Eq. 3 and 4), and the cosine over pi."""
+        """w+ T K_d cos_o / pi (Lucas 2024, Eq. 1 and 2), and the cosine over pi."""
         coat, cosine = self.material.coat, wo.z / dr.pi
         weight = grain_weight(self.grains.r, self.grains.to_sphere(wi), self.grains.to_sphere(wo))
         through = (1 - coat(wi.z)) * (1 - coat(wo.z)) if coat else 1
