@@ -52,6 +52,12 @@ USED = {  # descriptions that use all parameters between them
         "published": {"variant": "published"},
     },
     "chandrasekhar": {"default": {}, "albedo": {"albedo": 0.5}},
+    "interfacedlambertian": {
+        "beckmann": {},
+        "ggx": {"distribution": "ggx", "alpha_u": 0.2, "alpha_v": 0.5},
+        "gaussian": {"distribution": "gaussian", "masking": "vcavity"},
+        "ill-posed": {"distribution": "gaussian", "alpha": 0.2},
+    },
     "orennayar": {"default": {}, "qualitative": {"variant": "qualitative"}},
 }
 FITS = [("lambertsphere", "fast"), ("lambertsphere", "published")]
