@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from ..errors import ParameterError
 from .baselines.deon import DEon
 from .baselines.merillou import Merillou
 from .baselines.orennayar import OrenNayar
@@ -28,3 +29,16 @@ TEXTURES: dict[str, Any] = {"settled": Settled}
 
 PHASES: dict[str, Any] = {"lambertsphere_phase": LambertSpherePhase}
 """Phase functions by the name that a scene uses. It cannot be that of a BSDF: to Mitsuba all plugins are one list."""
+
+
+def with_microgeometry() -> list[str]:
+    """Names of the models that have a microgeometry to measure."""
+    return [name for name, model in MODELS.items() if model.geometry is not None]
+
+
+def microgeometry(description: dict[str, Any]) -> Any:
+    """The explicit microgeometry that a scene's description of a model stands for; raises ParameterError."""
+    if (name := description["type"]) not in with_microgeometry():
+        known = ", ".join(with_microgeometry())
+        raise ParameterError(f"{name!r} has no microgeometry to measure. Those that have: {known}.")
+    return MODELS[name].microgeometry(description)
