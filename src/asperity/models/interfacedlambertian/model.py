@@ -163,7 +163,7 @@ class InterfacedLambertian(LobeModel):
                 return self.table.result.at(alphas[0], wi, wo)
             return body_integral(distribution, facets, n, wi, wo, *(COARSE if self.approximate else RULE))
 
-        lobes = Interface(distribution, facets, n), Body(distribution, n, scale, integral)
+        lobes: list[Lobe] = [Interface(distribution, facets, n), Body(distribution, n, scale, integral)]
         return [Lifted(lobe, lift) for lobe in lobes]
 
     def _relative_index(self, inner: Any, outer: Any) -> Any:
