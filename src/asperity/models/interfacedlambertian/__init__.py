@@ -1,0 +1,1 @@
+"""Interfaced Lambertian microfacets."""
