@@ -11,7 +11,7 @@ import pytest
 
 from asperity import models, plugin
 from asperity.lab import checks, evaluate
-from asperity.lobes import LobeModel, diffuse, glossy
+from asperity.lobes import Lobe, LobeModel, Opening, diffuse, glossy
 from asperity.microfacet.sampling import cosine_hemisphere
 from asperity.parameters import BSDF, Texture
 
@@ -30,7 +30,7 @@ BASES = {
 
 
 @dataclass
-class Matt:
+class Matt(Lobe):
     """A share of the light, by cosine; a part ``lost`` of what is drawn is rejected."""
 
     amount: Any
@@ -48,7 +48,7 @@ class Matt:
         return type(wo)(wo.x, wo.y, dr.select(u < self.lost, -1, wo.z))
 
 
-class Uniform:
+class Uniform(Opening):
     """What neither lobe takes, in all directions."""
 
     def share(self, wi):
@@ -76,7 +76,7 @@ class Layers(LobeModel):
 
 @pytest.fixture
 def layers(rgb, monkeypatch):
-    monkeypatch.setattr(models, "MODELS", {"layers": Layers})
+    monkeypatch.setitem(models.MODELS, "layers", Layers)
     plugin.register()
     return lambda base: mi.load_dict({"type": "layers"} | ({} if base is None else {"base": BASES[base]}))
 

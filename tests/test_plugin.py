@@ -31,6 +31,8 @@ def at_normal(n=1):
         "import mitsuba as mi; mi.set_variant('scalar_rgb'); import asperity",
         "import mitsuba as mi; import asperity; mi.set_variant('scalar_rgb')",
         "from asperity.models import MODELS; import mitsuba as mi; mi.set_variant('llvm_ad_rgb')",
+        "import asperity.microfacet.albedo; import mitsuba as mi; mi.set_variant('scalar_rgb')",
+        "import asperity.plugin; import mitsuba as mi; mi.set_variant('scalar_rgb')",
     ],
 )
 def test_registers_whatever_comes_first(code):

@@ -6,7 +6,7 @@
 
 import sys
 
-from . import llvm
+from . import llvm, on_import
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "llvm"]
@@ -14,10 +14,6 @@ __all__ = ["__version__", "llvm"]
 llvm.choose()
 
 if "mitsuba" in sys.modules:
-    from . import plugin
-
-    plugin.register()
+    on_import.follow()
 else:
-    from . import on_import
-
-    on_import.register_after_mitsuba()
+    on_import.follow_once_imported()

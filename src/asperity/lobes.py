@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -35,41 +35,42 @@ def _front(kind: Any, isotropic: bool) -> int:
     return int(kind | mi.BSDFFlags.FrontSide | (0 if isotropic else mi.BSDFFlags.Anisotropic))
 
 
-class Lobe(Protocol):
+class Lobe:
     """One way to scatter light at a surface point; it holds the values of parameters there, never the model."""
 
     def share(self, wi: Any) -> Any:
-        """Share of the light from ``wi``, by which ``sample`` chooses; needs no exact sum. A lobe alone has no need."""
+        """Share of the light from ``wi``, by which ``sample`` chooses; need not add up to 1. All, if not defined."""
+        return 1
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """(f cos_o, solid-angle density of `draw`): a spectrum or number, and a number."""
+        raise NotImplementedError
 
     def draw(self, wi: Any, u: Any, v: Any) -> Any:
         """A direction from a number and a pair of numbers in [0, 1); one from below the surface is a rejected sample.
 
         Fewer are used than given, or more: then by `microfacet.sampling`.
         """
+        raise NotImplementedError
 
 
-class Opening(Protocol):
+class Opening:
     """How much of the base is seen at a surface point, through what lies on it; here, directions may be from below."""
 
     def share(self, wi: Any) -> Any:
         """Share of what is seen from ``wi`` that is base."""
+        raise NotImplementedError
 
     def reach(self, wi: Any, wo: Any) -> Any:
         """Share of the base that both directions reach."""
+        raise NotImplementedError
 
 
 @dataclass
-class ByCosine:
+class ByCosine(Lobe):
     """A lobe that is drawn by cosine, and stands alone."""
 
     brdf: Callable[[Any, Any], Any]  # (wi, wo) -> f per steradian
-
-    def share(self, wi: Any) -> Any:
-        """All."""
-        return 1
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """(f cos_o, cos_o / pi)."""
@@ -81,7 +82,7 @@ class ByCosine:
 
 
 @dataclass
-class Lifted:
+class Lifted(Lobe):
     """A lobe that gets directions which ``lift`` keeps off the horizon, where its formulas break in float32."""
 
     lobe: Lobe
@@ -162,7 +163,9 @@ class LobeModel(Declared):
         bs.pdf = dr.detach(pdf)
         return bs, _weight(value, bs.pdf)
 
-    def _sample_base(self, ctx, si, sample1, sample2, active, bs, start, chance) -> tuple[Any, Any]:
+    def _sample_base(
+        self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any, bs: Any, start: Any, chance: Any
+    ) -> tuple[Any, Any]:
         """The end of `sample`: the base, where it is chosen (beyond ``start``), or else ``bs``; and the weight."""
         on_base = active & (sample1 >= start)
         context, u = self._base_context(ctx), _rescale(sample1, start, chance)
@@ -180,7 +183,7 @@ class LobeModel(Declared):
         bs.pdf = dr.select(delta, bs.pdf * chance, pdf)
         return bs, dr.select(delta, single, _weight(value, pdf)) & active
 
-    def _stale(self, context, si, bs, active) -> Any:
+    def _stale(self, context: Any, si: Any, bs: Any, active: Any) -> Any:
         """Whether the base, which gave a weight of 0, rejected the sample and left the rest of it as it was.
 
         Mitsuba's samplers do. A black base is no rejection.
@@ -188,7 +191,7 @@ class LobeModel(Declared):
         value, pdf = self.base.eval_pdf(context, si, bs.wo, active)
         return dr.any(mi.unpolarized_spectrum(value) > 0) | (dr.abs(pdf - bs.pdf) > 0.01 * bs.pdf)
 
-    def _choose(self, ctx, si, active) -> tuple[Sequence[Lobe], dict[int, Any], Any]:
+    def _choose(self, ctx: Any, si: Any, active: Any) -> tuple[Sequence[Lobe], dict[int, Any], Any]:
         """The lobes here, the chance of each that is enabled, and that of the base (None if not wanted)."""
         lobes, wi, seen = self.lobes(si, active), above(si.wi), si.wi.z > 0
         smooth = int(mi.BSDFFlags.Smooth)

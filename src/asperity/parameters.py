@@ -336,7 +336,7 @@ class Choice(Parameter):
     options: tuple[str, ...] = ()
     kind: ClassVar[str] = "choice"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "default", self.options[0])
 
     def allowed(self) -> str:

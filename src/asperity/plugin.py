@@ -15,31 +15,24 @@ import mitsuba as mi
 from . import llvm, loading, threads
 from .microfacet.albedo import directional_albedo
 from .microfacet.quadrature import RULES, rule
+from .models import MODELS, PHASES, TEXTURES
 from .parameters import Usual
 
 ALBEDO_SAMPLES = 256
 
 
 def register() -> None:
-    """Register every model now, if a variant is active, and after every later switch; may be called twice."""
-    mi.detail.remove_variant_callback(_switched)
-    mi.detail.add_variant_callback(_switched)
-    if mi.variant() is not None:
-        _switched(None, mi.variant())
-
-
-def _switched(_old: str | None, new: str | None) -> None:
-    from .models import MODELS, PHASES, TEXTURES  # they import Mitsuba, whose import may be what brought us here
-
-    llvm.guard(new)
+    """Register every model in the active variant."""
+    variant = mi.variant()
+    llvm.guard(variant)
     threads.ensure_worker()
     loading.PLUGINS.update(MODELS, TEXTURES, PHASES)
     for name, model in MODELS.items():
-        mi.register_bsdf(name, _bsdf(model, new))
+        mi.register_bsdf(name, _bsdf(model, variant))
     for name, model in TEXTURES.items():
-        mi.register_texture(name, _texture(model, new))
+        mi.register_texture(name, _texture(model, variant))
     for name, model in PHASES.items():
-        mi.register_phase(name, _phase(model, new))
+        mi.register_phase(name, _phase(model, variant))
 
 
 def _plugin(base: Any, model_class: Any) -> type:

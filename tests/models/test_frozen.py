@@ -19,6 +19,8 @@ CASES = {  # description, and a parameter to move
     "non-symmetric": ({"type": "vgroove", "symmetric": False}, "alpha.value"),
     "lambertsphere": ({"type": "lambertsphere"}, "reflectance.value"),
     "chandrasekhar": ({"type": "chandrasekhar"}, "reflectance.value"),
+    "interfacedlambertian": ({"type": "interfacedlambertian"}, "alpha.value"),
+    "stretched": ({"type": "interfacedlambertian", "alpha_u": 0.2, "alpha_v": 0.5}, "alpha_u.value"),
     "orennayar": ({"type": "orennayar"}, "reflectance.value"),
     "deon": ({"type": "deon", "base": BASE}, "tau_0.value"),
     "merillou": ({"type": "merillou", "base": BASE}, "tau_0.value"),

@@ -32,6 +32,7 @@ COLOURS = {
     "published": ({"type": "lambertsphere", "variant": "published"}, "reflectance"),
     "fast": ({"type": "lambertsphere", "variant": "fast"}, "reflectance"),
     "chandrasekhar": ({"type": "chandrasekhar"}, "reflectance"),
+    "interfacedlambertian": ({"type": "interfacedlambertian"}, "diffuse_reflectance"),
     "orennayar": ({"type": "orennayar"}, "reflectance"),
 }
 

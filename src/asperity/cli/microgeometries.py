@@ -10,7 +10,7 @@ import typer
 
 from asperity.errors import ParameterError, UnknownNameError, refuse_unused
 
-from . import materials, registry
+from . import materials
 
 if TYPE_CHECKING:
     from asperity.goniophotometer import Microgeometry
@@ -37,15 +37,16 @@ class Wanted(NamedTuple):
 
     def microgeometry(self) -> tuple[Microgeometry, dict[str, Any]]:
         """The microgeometry, and what to note about it; needs a variant."""
+        from asperity import models
         from asperity.goniophotometer.mesh import FROM_FILE
 
         if self.target in FROM_FILE:
             return self._from_file(), {}
-        if self.target is not None and self.target not in registry.models():
-            raise UnknownNameError("microgeometry", self.target, [*with_microgeometry(), *FROM_FILE])
+        if self.target is not None and self.target not in models.MODELS:
+            raise UnknownNameError("microgeometry", self.target, [*models.with_microgeometry(), *FROM_FILE])
         description = self._description()
         refuse_unused({"file": self.file, **self.shape}, (), self.name)
-        return of_model(description), {"model": description}
+        return models.microgeometry(description), {"model": description}
 
     def _description(self) -> dict[str, Any]:
         """That of the model, checked."""
@@ -70,21 +71,6 @@ class Wanted(NamedTuple):
         if isinstance(surface, goniophotometer.HeightField):
             typer.echo(f"{self.file}: {surface.account}")
         return surface
-
-
-def with_microgeometry() -> list[str]:
-    """Names of the models that have one."""
-    return [name for name, model in registry.models().items() if hasattr(model, "microgeometry")]
-
-
-def of_model(description: dict[str, Any]) -> Microgeometry:
-    """The microgeometry that a model stands for."""
-    name = description["type"]
-    if name not in with_microgeometry():
-        raise ParameterError(
-            f"{name!r} has no microgeometry to measure. Those that have: {', '.join(with_microgeometry())}."
-        )
-    return registry.model(name).microgeometry(description)
 
 
 def facets(text: str) -> dict[str, Any]:

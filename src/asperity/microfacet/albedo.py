@@ -24,7 +24,7 @@ def directional_albedo(
     derivatives are needed and ``copies`` asked for, which few samples can afford and forward derivatives may need.
     """
 
-    def weight(index, captured):
+    def weight(index: Any, captured: Any) -> tuple[Any]:
         # Strata for the choice of the lobe, the R2 sequence (Roberts 2018) for the direction.
         steps = (mi.Float(index) * a + 0.5 for a in (0.6180339887, 0.7548776662, 0.5698402910))
         jitter, u, v = (step - dr.floor(step) for step in steps)

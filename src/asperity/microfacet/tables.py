@@ -81,6 +81,9 @@ class Made:
     """What is made from constants: anew when they changed, and whenever they carry derivatives, for it to carry them.
 
     A dataclass, so that ``dr.freeze`` finds the arrays in it.
+
+    Forward derivatives of ``mi.render`` by the only parameter that has some leave out what was made from it (Dr.Jit 1.5
+    comes to the picture first); those of an integrator's ``render_forward`` after ``dr.traverse`` do not.
     """
 
     result: Any = None

@@ -2,9 +2,11 @@
 
 from typing import Any
 
+from ..errors import ParameterError
 from .baselines.deon import DEon
 from .baselines.merillou import Merillou
 from .baselines.orennayar import OrenNayar
+from .interfacedlambertian import InterfacedLambertian
 from .lambertsphere import Chandrasekhar, LambertSphere, LambertSpherePhase
 from .micrograin import Micrograin
 from .textures import Settled
@@ -18,6 +20,7 @@ MODELS: dict[str, Any] = {
     "lambertsphere": LambertSphere,
     "chandrasekhar": Chandrasekhar,
     "orennayar": OrenNayar,
+    "interfacedlambertian": InterfacedLambertian,
 }
 """BSDF plugins by the name that a scene uses."""
 
@@ -26,3 +29,16 @@ TEXTURES: dict[str, Any] = {"settled": Settled}
 
 PHASES: dict[str, Any] = {"lambertsphere_phase": LambertSpherePhase}
 """Phase functions by the name that a scene uses. It cannot be that of a BSDF: to Mitsuba all plugins are one list."""
+
+
+def with_microgeometry() -> list[str]:
+    """Names of the models that have a microgeometry to measure."""
+    return [name for name, model in MODELS.items() if model.geometry is not None]
+
+
+def microgeometry(description: dict[str, Any]) -> Any:
+    """The explicit microgeometry that a scene's description of a model stands for; raises ParameterError."""
+    if (name := description["type"]) not in with_microgeometry():
+        known = ", ".join(with_microgeometry())
+        raise ParameterError(f"{name!r} has no microgeometry to measure. Those that have: {known}.")
+    return MODELS[name].microgeometry(description)

@@ -52,7 +52,7 @@ def test_phase_function_has_its_moments():
     assert [(p * cos**k).sum() for k in range(3)] == pytest.approx([1, -4 / 9, 3 / 8], abs=1e-12)
     ends = np.array(transport.phase(float64([-1, 1])))
     assert ends == pytest.approx([2 / (3 * np.pi), 0], abs=1e-12)
-    lobe = np.array(transport.lobe(float64(cos))) * measure
+    lobe = np.array(transport.like_phase(float64(cos))) * measure
     assert lobe.sum() == pytest.approx(1, abs=1e-12)
 
 

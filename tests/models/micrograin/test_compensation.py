@@ -129,14 +129,14 @@ def test_the_table_carries_derivatives_of_beta(rgb, case):
 @pytest.mark.parametrize("grains", [{}, {"specular": False}], ids=["mirror", "diffuse"])
 @pytest.mark.parametrize("tau_0", [0.002, 0.01])
 def test_derivatives_among_few_grains(rgb, monkeypatch, grains, tau_0):
-    """What crosses the horizon is then most of it: of tables of many points, whose differences are good to 0.5 %.
+    """What crosses the horizon is then most of it: against tables of many points, whose differences are good to 1 %.
 
-    At directions that move with beta, derivatives were wrong by 4 to 13 %.
+    Those of the table itself are good to 4 to 7 %; at directions that move with beta, ours would be wrong by 6 to 66 %.
     """
     found, _ = derivative_and_difference({"tau_0": tau_0, **grains}, 1e-2)
     monkeypatch.setattr(compensation, "SAMPLES", 1 << 16)
     _, expected = derivative_and_difference({"tau_0": tau_0, **grains}, 1e-2)
-    assert np.abs(found - expected).mean() < 0.02 * np.abs(expected).mean()
+    assert np.abs(found - expected).mean() < 0.04 * np.abs(expected).mean()
 
 
 def test_an_update_makes_a_new_table_if_beta_changed(rgb):

@@ -95,7 +95,7 @@ class Mixture(LobeModel):
 
 
 @dataclass
-class GGXMetal:
+class GGXMetal(Lobe):
     """The lobe of GGX metal that covers a share of the surface."""
 
     layer: Layer
@@ -122,7 +122,7 @@ class GGXMetal:
 
 
 @dataclass
-class Rest:
+class Rest(Opening):
     """The base where the metal is not; out of sight from below."""
 
     layer: Layer

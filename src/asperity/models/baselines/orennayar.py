@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 
 from ...lobes import ByCosine, Lobe, LobeModel, diffuse
 from ...microfacet.numerics import TINY, clamp
 from ...parameters import Choice, Colour, Texture, Usual
-
-CITATION = """\
-@inproceedings{Oren1994Lambert,
-  author    = {Oren, Michael and Nayar, Shree K.},
-  title     = {Generalization of {Lambert's} Reflectance Model},
-  booktitle = {Proceedings of SIGGRAPH 94},
-  pages     = {239--246},
-  year      = {1994},
-  doi       = {10.1145/192161.192213}
-}"""
 
 
 class OrenNayar(LobeModel):
@@ -28,7 +18,15 @@ class OrenNayar(LobeModel):
     simpler fit that renderers use, of single scattering alone. Sampled by cosine.
     """
 
-    citation = CITATION
+    citation = """\
+@inproceedings{Oren1994Lambert,
+  author    = {Oren, Michael and Nayar, Shree K.},
+  title     = {Generalization of {Lambert's} Reflectance Model},
+  booktitle = {Proceedings of SIGGRAPH 94},
+  pages     = {239--246},
+  year      = {1994},
+  doi       = {10.1145/192161.192213}
+}"""
 
     reflectance = Colour("albedo of the facets", 0.5)
     sigma = Texture("standard deviation of the facets' tilt", 20.0, high=90, unit="degree", usually=Usual(0, 45))
@@ -40,42 +38,36 @@ class OrenNayar(LobeModel):
 
     def lobes(self, si: Any, active: Any) -> list[Lobe]:
         """The model, drawn by cosine."""
-        brdf, tilt = {"full": full, "qualitative": qualitative}[self.variant], dr.deg2rad(self.at("sigma", si, active))
-        albedo = self.at("reflectance", si, active)
-        return [ByCosine(lambda wi, wo: brdf(Angles.of(wi, wo), dr.square(tilt), albedo))]
+        brdf = full if self.variant == "full" else qualitative
+        tilt, albedo = dr.deg2rad(self.at("sigma", si, active)), self.at("reflectance", si, active)
+        return [ByCosine(lambda wi, wo: brdf(wi, wo, tilt * tilt, albedo))]
 
 
-class Angles(NamedTuple):
-    """Two directions above the surface: alpha is the larger angle with the normal, beta the smaller one."""
+def angles(wi: Any, wo: Any) -> tuple[Any, ...]:
+    """(cos alpha, cos beta, sin alpha, sin beta, q) of two unit vectors above the surface.
 
-    cos_alpha: Any
-    cos_beta: Any
-    sin_alpha: Any
-    sin_beta: Any
-    q: Any  # sin(alpha) sin(beta) cos(phi)
-
-    @classmethod
-    def of(cls, wi: Any, wo: Any) -> Angles:
-        """The angles of two unit vectors."""
-        sin_i, sin_o = (dr.sqrt(dr.square(w.x) + dr.square(w.y) + TINY) for w in (wi, wo))
-        cos_i, cos_o = (dr.maximum(w.z, 1e-4) for w in (wi, wo))
-        steep = cos_i < cos_o
-        cosines, sines = (cos_i, cos_o), (dr.select(steep, sin_i, sin_o), dr.select(steep, sin_o, sin_i))
-        return cls(dr.minimum(*cosines), dr.maximum(*cosines), *sines, wi.x * wo.x + wi.y * wo.y)
+    alpha is the larger angle with the normal, beta the smaller one, and q = sin(alpha) sin(beta) cos(phi).
+    """
+    sin_i, sin_o = (dr.sqrt(dr.square(w.x) + dr.square(w.y) + TINY) for w in (wi, wo))
+    cos_i, cos_o = (dr.maximum(w.z, 1e-4) for w in (wi, wo))
+    steep = cos_i < cos_o
+    sines = dr.select(steep, sin_i, sin_o), dr.select(steep, sin_o, sin_i)
+    return dr.minimum(cos_i, cos_o), dr.maximum(cos_i, cos_o), *sines, wi.x * wo.x + wi.y * wo.y
 
 
-def qualitative(angles: Angles, variance: Any, albedo: Any) -> Any:
+def qualitative(wi: Any, wo: Any, variance: Any, albedo: Any) -> Any:
     """f_r per steradian (Oren and Nayar 1994, the qualitative model), for the variance of the tilt in radians."""
+    _, cos_beta, _, _, q = angles(wi, wo)
     a, b = 1 - 0.5 * variance / (variance + 0.33), 0.45 * variance / (variance + 0.09)
-    return albedo / dr.pi * (a + b * dr.maximum(angles.q, 0) / angles.cos_beta)
+    return albedo / dr.pi * (a + b * dr.maximum(q, 0) / cos_beta)
 
 
-def full(angles: Angles, variance: Any, albedo: Any) -> Any:
+def full(wi: Any, wo: Any, variance: Any, albedo: Any) -> Any:
     """f_r per steradian (Oren and Nayar 1994, the functional approximation), for the variance of the tilt in radians.
 
     sin(alpha) cos(phi) tan(beta) = q / cos(beta), and tan((alpha + beta) / 2) is the sines' sum over the cosines'.
     """
-    cos_alpha, cos_beta, sin_alpha, sin_beta, q = angles
+    cos_alpha, cos_beta, sin_alpha, sin_beta, q = angles(wi, wo)
     alpha, beta = (2 / dr.pi * dr.atan2(s, c) for s, c in ((sin_alpha, cos_alpha), (sin_beta, cos_beta)))
     cos_phi = dr.clip(q / (sin_alpha * sin_beta), -1, 1)
     c1, c2 = 1 - 0.5 * variance / (variance + 0.33), 0.45 * variance / (variance + 0.09)

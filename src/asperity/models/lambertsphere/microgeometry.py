@@ -55,7 +55,7 @@ class RandomWalk:
 
     albedo: float | tuple[float, float, float] = 0.8
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_albedo(self.albedo)
 
     @classmethod
@@ -96,7 +96,7 @@ class ExplicitSpheres:
     depth: float = 12.0
     width: float = 6.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_albedo(self.albedo)
         for name, high in (("fraction", 0.5), ("depth", 100), ("width", 100)):
             if not 0 < getattr(self, name) <= high:

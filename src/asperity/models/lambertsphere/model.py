@@ -36,8 +36,8 @@ class HalfSpace(LobeModel):
     reflectance = Colour("Bond albedo of the material, as seen in uniform light", 0.5)
     albedo = Colour("albedo of the particles, instead of reflectance")
 
-    lobe: Callable[[Any], Any]  # (cosine between propagation directions) -> density per steradian
-    draw: Callable[[Any], Any]  # (uniform number) -> such a cosine
+    once: Callable[[Any], Any]  # (cosine between propagation directions) -> density per steradian, to draw by
+    draw_once: Callable[[Any], Any]  # (uniform number) -> such a cosine
     root: Callable[[Any], Any]  # (Bond albedo) -> s = sqrt(1 - albedo of the particles)
 
     def brdf(self, pair: Directions, s: Any) -> Any:
@@ -55,7 +55,7 @@ class HalfSpace(LobeModel):
 
     def lobes(self, si: Any, active: Any) -> list[Lobe]:
         """All orders of scattering."""
-        return [Particles(self.brdf, self.lobe, self.draw, self.s(si, active))]
+        return [Particles(self.brdf, self.once, self.draw_once, self.s(si, active))]
 
     def s(self, si: Any, active: Any) -> Any:
         """s = sqrt(1 - c) in [0, 1], with a finite derivative at c = 1."""
@@ -65,37 +65,33 @@ class HalfSpace(LobeModel):
 
 
 @dataclass
-class Particles:
+class Particles(Lobe):
     """The lobe of a half space: drawn from what was scattered once, or by cosine.
 
-    Once by a lobe like the phase function, as if the particle lay at the surface, and what goes down folded up. The
+    Once by a density like the phase function, as if the particle lay at the surface, and what goes down folded up. The
     density is exact, and it bounds the weight at grazing incidence, where f_r is unbounded.
     """
 
     brdf: Callable[[Directions, Any], Any]
-    lobe: Callable[[Any], Any]
-    draw_cosine: Callable[[Any], Any]
+    once: Callable[[Any], Any]
+    draw_once: Callable[[Any], Any]
     s: Any
-
-    def share(self, wi: Any) -> Any:
-        """All."""
-        return 1
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """(f cos_o, density)."""
-        pair, chance = Directions.of(wi, wo), self.once(wi)
+        pair, chance = Directions.of(wi, wo), self.chance(wi)
         product = pair.u * pair.v
-        once = self.lobe(-pair.q - product) + self.lobe(product - pair.q)  # up, and folded up
+        once = self.once(-pair.q - product) + self.once(product - pair.q)  # up, and folded up
         return self.brdf(pair, self.s) * wo.z, chance * once + (1 - chance) * (wo.z / dr.pi)
 
     def draw(self, wi: Any, u: Any, v: Any) -> Any:
-        """One or the other, by `once`."""
-        once = u < self.once(wi)
-        wo = spherical(dr.select(once, -self.draw_cosine(v.x), dr.sqrt(1 - v.x)), v.y)
+        """One or the other, by `chance`."""
+        once = u < self.chance(wi)
+        wo = spherical(dr.select(once, -self.draw_once(v.x), dr.sqrt(1 - v.x)), v.y)
         wo = dr.select(once, about(wi, wo), wo)
         return type(wo)(wo.x, wo.y, dr.abs(wo.z))
 
-    def once(self, wi: Any) -> Any:
+    def chance(self, wi: Any) -> Any:
         """Probability to draw single scattering, within 2 to 10 % of the best for each direction and albedo."""
         return dr.detach((1 - wi.z) * (0.4 + 0.5 * dr.mean(self.s * self.s)))
 
@@ -113,8 +109,8 @@ class LambertSphere(HalfSpace):
 
     variant = Choice("fits of the exact solution", options=("accurate", "published", "fast"))
 
-    lobe = staticmethod(transport.lobe)
-    draw = staticmethod(transport.sample_lobe)
+    once = staticmethod(transport.like_phase)
+    draw_once = staticmethod(transport.sample_like_phase)
 
     def root(self, bond: Any) -> Any:
         """With the published fits, the published map."""
@@ -146,12 +142,12 @@ class Chandrasekhar(HalfSpace):
     brdf = staticmethod(transport.isotropic)
 
     @staticmethod
-    def lobe(cos: Any) -> Any:
+    def once(cos: Any) -> Any:
         """The same in all directions."""
         return 0 * cos + dr.inv_four_pi
 
     @staticmethod
-    def draw(u: Any) -> Any:
+    def draw_once(u: Any) -> Any:
         """A cosine of any direction."""
         return 1 - 2 * u
 

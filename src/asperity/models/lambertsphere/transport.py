@@ -144,13 +144,13 @@ def invert_phase(u: Any) -> Any:
     return dr.clip(cos - dr.clip(step, -1e-4, 1e-4), -1, 1)
 
 
-def lobe(cos: Any) -> Any:
+def like_phase(cos: Any) -> Any:
     """Density per steradian, 3 / (16 pi) (1 - cos)^2, like that of `phase` and cheaper: for BSDFs to sample with."""
     return dr.square(1 - cos) * (3 / (16 * dr.pi))
 
 
-def sample_lobe(u: Any) -> Any:
-    """Cosine with the density `lobe`, from one uniform number."""
+def sample_like_phase(u: Any) -> Any:
+    """Cosine with the density `like_phase`, from one uniform number."""
     return 1 - 2 * dr.cbrt(1 - u)
 
 

@@ -48,6 +48,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import numpy as np
 
+from ...lobes import Lobe
 from ...microfacet.ggx import GRAZING, lift, normal_in_sphere_space, to_sphere
 from ...microfacet.numerics import ONE_BELOW
 from ...microfacet.quadrature import accumulate
@@ -141,7 +142,7 @@ def returned(tau_0: Any, loss: Loss, lost_i: Any, lost_o: Any, grain: Any, base:
 
 
 @dataclass
-class Returned:
+class Returned(Lobe):
     """The lobe of light that single scattering loses, drawn by cosine."""
 
     grains: Grains

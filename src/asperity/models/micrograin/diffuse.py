@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from ...lobes import Lobe
 from ...microfacet.numerics import heading
 from ...microfacet.quadrature import gauss_legendre, integrate
 from ...microfacet.sampling import about, cosine_hemisphere, split
@@ -75,7 +76,7 @@ def lambertian(
 
 
 @dataclass
-class Lambertian:
+class Lambertian(Lobe):
     """The lobe of diffuse grains, bare or under a coat (Lucas 2024, Eq. 21)."""
 
     grains: Grains

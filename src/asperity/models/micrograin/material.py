@@ -8,6 +8,7 @@ from typing import Any
 
 import drjit as dr
 
+from ...microfacet.numerics import TINY
 from ...microfacet.quadrature import gauss_legendre
 from .grains import SecondColour
 
@@ -60,7 +61,7 @@ class Material:
         if self.coat is None:
             return 1
         albedo = dr.mean(self.mean_colour)
-        return albedo / (albedo + self.coat(cos))
+        return albedo / dr.maximum(albedo + self.coat(cos), TINY)
 
     def mean_albedo(self) -> Any:
         """Hemispherical mean of what a facet reflects, at half height and upright."""

@@ -32,7 +32,7 @@ class ExplicitGrains:
     base: dict[str, Any] = field(default_factory=lambda: BLACK)
     grains: int = 4096
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("tau_0", "beta_x", "beta_y"):
             _number(name, getattr(self, name))
         if not 0 <= self.tau_0 < 1:

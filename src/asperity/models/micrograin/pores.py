@@ -8,7 +8,7 @@ from typing import Any
 
 import drjit as dr
 
-from ...lobes import above
+from ...lobes import Opening, above
 from .grains import Grains, exposure
 from .shadows import Shadows, shadow
 
@@ -19,7 +19,7 @@ def visibility(r: Any, shaded: Any) -> Any:
 
 
 @dataclass
-class Pores:
+class Pores(Opening):
     """How the base is seen between grains.
 
     Beyond the paper, below the surface: nothing casts shadows there, but light meets the base through pores only, from

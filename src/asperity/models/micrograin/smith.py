@@ -12,6 +12,7 @@ from typing import Any
 
 import drjit as dr
 
+from ...lobes import Lobe
 from ...microfacet.ggx import inclination, normal_in_sphere_space, sample_visible_normal, smith_lambda
 from ...microfacet.masking import smith_masking
 from ...microfacet.numerics import one_minus_exp
@@ -66,7 +67,7 @@ def _pore_depth(r: Any, i: Any, o: Any) -> Any:
 
 
 @dataclass
-class SmithSpecular:
+class SmithSpecular(Lobe):
     """The lobe of grains' surfaces; sampled by the visible normals of GGX, whose D theirs is like."""
 
     grains: Grains
@@ -93,7 +94,7 @@ class SmithSpecular:
 
 
 @dataclass
-class SmithLambertian:
+class SmithLambertian(Lobe):
     """The lobe of diffuse grains, which are flat here; sampled by cosine."""
 
     grains: Grains

@@ -8,6 +8,7 @@ from typing import Any
 
 import drjit as dr
 
+from ...lobes import Lobe
 from ...microfacet.ggx import normal_in_sphere_space
 from ...microfacet.sampling import reflect
 from .grains import Grains, exposure
@@ -31,7 +32,7 @@ def reflected(grains: Grains, wi: Any, wo: Any, shaded: Callable[[Shadows, Any],
 
 
 @dataclass
-class Specular:
+class Specular(Lobe):
     """The lobe of grains' surfaces (Lucas 2024, Eq. 22)."""
 
     grains: Grains

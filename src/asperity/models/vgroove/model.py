@@ -149,17 +149,13 @@ class VGroove(LobeModel):
 
 
 @dataclass
-class GrooveLobe:
+class GrooveLobe(Lobe):
     """The lobe of grooves: all ways through them, however many bounces that takes."""
 
     distribution: Distribution
     symmetric: bool
     most: Any  # bounces that are followed
     reflectance: Reflectance | None  # None is a mirror
-
-    def share(self, wi: Any) -> Any:
-        """All."""
-        return 1
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """(f cos_o, density), which is the same for mirrors."""
