@@ -146,7 +146,7 @@ def more():
     ],
 )
 def test_more_bounces_by_an_independent_tracer(more, surface, mean, left):
-    """Energy, to the tracer's .001; and the share of it that is left at K_d = .5 and .8, of which the model is rough."""
+    """Energy, to the tracer's .001; and the share of it that is left at K_d = .5 and .8, which is roughly modelled."""
     found, n = more[surface], mi.Float(surface[2])
     if mean is not None:
         assert float(found.mean[0]) == pytest.approx(mean, abs=1e-3)

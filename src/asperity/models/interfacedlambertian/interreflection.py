@@ -90,7 +90,8 @@ def exchange(a: Any, b: Any, cos_m: Any) -> Any:
     k, two = 2 * cos_m * cos_m - 1, 2 * cos_m
     to_b = dr.sqrt(dr.maximum(1 + b * (b - two), TINY))  # |P_0 Q_1|
     from_a = dr.sqrt(dr.maximum(1 + a * (a - two), TINY))  # |P_1 Q_0|
-    ends = dr.sqrt(dr.maximum(1 + a * (a - two) + b * (b - two) + 2 * a * b * k, TINY))  # |P_1 Q_1|
+    level, upright = 1 - (a + b) * cos_m, dr.square(a - b) * (1 - cos_m) * (1 + cos_m)
+    ends = dr.sqrt(dr.square(level) + upright + TINY**2)  # |P_1 Q_1|, without cancellation at the bottom
     slope = (a - two) / (from_a + 1) + (a - two + 2 * b * k) / (ends + to_b)
     return dr.maximum(((b - two) * slope - 2 * k * (to_b + 1)) / (2 * (to_b + 1) * (ends + from_a)), 0)
 
