@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from ...errors import ParameterError
 from ...lobes import Lifted, Lobe, LobeModel, diffuse, glossy
 from ...microfacet.distributions import GGX, Beckmann, Distribution, Gaussian
 from ...microfacet.numerics import clamp
 from ...microfacet.sampling import cosine_hemisphere, reflect
-from ...parameters import Axes, Choice, Colour, Flag, Ior, Usual, numbers, varies
+from ...microfacet.tables import Made
+from ...parameters import Axes, Choice, Colour, Flag, Ior, Usual, constant, numbers, varies
 from .body import GRAZING, body_albedo, body_integral, fresnel, interface, outer_reflectance, transmitted
 from .facets import FACETS, Facets
+from .table import IntegralTable, steps
 
 CITATION = """\
 @article{Meneveaux2018Rendering,
@@ -68,6 +72,37 @@ class InterfacedLambertian(LobeModel):
     def configure(self, given: set[str]) -> None:
         """Complain of what does not go together."""
         self.check()
+        self.table = Made()
+
+    def update(self) -> None:
+        """Bring the table of the integral up to date, if parameters vary little enough for one."""
+        if not self._tabulated():
+            self.table = Made()
+            return
+        make = partial(IntegralTable.made, DISTRIBUTIONS[self.distribution], FACETS[self.masking]())
+        n = self._relative_index(constant("int_ior", self.int_ior), constant("ext_ior", self.ext_ior))
+        ((name, alpha),) = self.alpha.textures.items()
+        if not varies(alpha):
+            self.table.update(make, n, self._least(type(self).alpha.clamp(constant(name, alpha))))
+            return
+        low, high = (float(np.clip(end, type(self).alpha.low, type(self).alpha.high)) for end in self._extent(alpha))
+        self.table.update(make, n, *steps(low, high))
+
+    def _tabulated(self) -> bool:
+        """Whether the integral depends on few enough numbers."""
+        if self.approximate or not self.alpha.isotropic or varies(self.int_ior) or varies(self.ext_ior):
+            return False
+        (alpha,) = self.alpha.textures.values()
+        return not varies(alpha) or bool(self._shown(alpha))
+
+    @staticmethod
+    def _shown(texture: Any) -> list[np.ndarray]:
+        """The numbers that Mitsuba shows of a texture."""
+        return [found for _, found in numbers(texture, differentiated=True)]
+
+    def _extent(self, texture: Any) -> tuple[float, float]:
+        shown = self._shown(texture)
+        return min(found.min() for found in shown), max(found.max() for found in shown)
 
     def check(self) -> None:
         """Ranges, the order of the two indices, and where Smith's masking of the Gaussian ends."""
@@ -118,22 +153,25 @@ class InterfacedLambertian(LobeModel):
 
     def lobes(self, si: Any, active: Any) -> list[Lobe]:
         """Light that facets mirror, and light from below them."""
-        n = clamp(self.at("int_ior", si, active) / self.at("ext_ior", si, active), 1, 10)
-        distribution, facets = DISTRIBUTIONS[self.distribution](*self._alphas(si, active)), FACETS[self.masking]()
+        n = self._relative_index(self.at("int_ior", si, active), self.at("ext_ior", si, active))
+        alphas = [self._least(alpha) for alpha in self.at("alpha", si, active)]
+        distribution, facets = DISTRIBUTIONS[self.distribution](*alphas), FACETS[self.masking]()
         scale = body_albedo(self.at("diffuse_reflectance", si, active), n)
-        rule = COARSE if self.approximate else RULE
 
         def integral(wi: Any, wo: Any) -> Any:
-            return body_integral(distribution, facets, n, wi, wo, *rule)
+            if self.table.result is not None:
+                return self.table.result.at(alphas[0], wi, wo)
+            return body_integral(distribution, facets, n, wi, wo, *(COARSE if self.approximate else RULE))
 
-        lobes = Interface(distribution, facets, n), Body(distribution, n, scale, integral)
+        lobes: list[Lobe] = [Interface(distribution, facets, n), Body(distribution, n, scale, integral)]
         return [Lifted(lobe, lift) for lobe in lobes]
 
-    def _alphas(self, si: Any, active: Any) -> tuple[Any, Any]:
-        u, v = self.at("alpha", si, active)
-        if self._ill_posed():
-            u, v = (dr.minimum(alpha, Gaussian.largest_smith) for alpha in (u, v))
-        return u, v
+    def _relative_index(self, inner: Any, outer: Any) -> Any:
+        return clamp(inner / outer, 1, 10)
+
+    def _least(self, alpha: Any) -> Any:
+        """The roughness, or where Smith's masking of the Gaussian ends."""
+        return dr.minimum(alpha, Gaussian.largest_smith) if self._ill_posed() else alpha
 
 
 def lift(w: Any) -> Any:
