@@ -54,11 +54,11 @@ def percentiles(kind, varied, materials, n, seed=0):
     return np.percentile(np.concatenate([errors(rng, kind, n, varied) for _ in range(materials)]), [95, 99, 99.9])
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=" ".join)
+@pytest.mark.parametrize("kind", KINDS, ids=["-".join(kind) for kind in KINDS])
 @pytest.mark.parametrize("varied", ["", "textured", "anisotropic"], ids=["table", "textured", "sum"])
 @pytest.mark.parametrize("materials, n", [pytest.param(12, 800, marks=pytest.mark.slow), (2, 800)], ids=["all", "some"])
 def test_close_to_the_integral(rgb, kind, varied, materials, n):
-    """What is asked for: .5 % at the 95th percentile, 1.5 % at the 99th; of Smith's, which has no kinks but the horizon,
+    """What is asked for: .5 % at the 95th percentile, 1.5 % at the 99th; of Smith's, with no kinks but at the horizon,
     1 % at the 99.9th. Tables of many roughnesses have fewer terms, and are made with fewer nodes: 2 % each."""
     middle, high, highest = percentiles(kind, varied, materials, n)
     assert middle < 0.005 and high < (0.02 if varied == "textured" else 0.015)

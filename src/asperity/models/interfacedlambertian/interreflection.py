@@ -37,8 +37,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 
+from ...lobes import Lobe
 from ...microfacet.distributions import Distribution
 from ...microfacet.masking import cavity_visible_and_lit
 from ...microfacet.numerics import clamp, heading
@@ -132,8 +134,12 @@ class EvenTransmittance:
         axes = np.linspace(0, 1, TILTS), np.linspace(0, 1, PARTS), np.linspace(0, 1, PARTS)
         root, a, b = (np.maximum(x.ravel(), 0.01) for x in np.meshgrid(*axes, indexing="ij"))
         cos_m = np.maximum(1 - root * root, 1e-3)
-        nodes = (Float(x.astype(np.float32)) for x in (a / (2 * cos_m), b / (2 * cos_m), cos_m))
-        return cls(Table.of((TILTS, PARTS, PARTS), [even_transmittance(*nodes, n)]))
+        part_a, part_b, tilt = (Float(x.astype(np.float32)) for x in (a / (2 * cos_m), b / (2 * cos_m), cos_m))
+        return cls(Table.of((TILTS, PARTS, PARTS), [even_transmittance(part_a, part_b, tilt, n)]))
+
+    def native(self) -> EvenTransmittance:
+        """The same for the active variant."""
+        return EvenTransmittance(self.table.native())
 
     def __call__(self, a: Any, b: Any, cos_m: Any) -> Any:
         """Its value."""
@@ -179,7 +185,7 @@ def two_bounces(
 
 
 def mirrored_twice(distribution: Distribution, n: Any, wi: Any, wo: Any) -> tuple[Any, Any]:
-    """(f_ss cos_o, the same of perfect mirrors).
+    """(f_ss cos_o, density of these paths: the same of perfect mirrors, but for how a Gaussian is sampled).
 
     Two reflections turn -i about the cavity's axis by four times the tilt, so two cavities alone send i to o. They lie
     along the azimuth of i + o. Towards the mirror direction all of a family do: there is a pole, blunted to `POLE`.
@@ -194,31 +200,34 @@ def mirrored_twice(distribution: Distribution, n: Any, wi: Any, wo: Any) -> tupl
         part, _ = mirrored_part(wi, m, lit, seen)
         across = dr.sqrt(dr.maximum(1 - dr.square(wi.y * cos_phi - wi.x * sin_phi), TINY))
         pole = dr.maximum(dr.abs(dr.sin((angle_i + angle_o) / 2)), POLE)
-        once = distribution.density(m) * part / (8 * wi.z * across * pole)
-        value, density = value + once * fresnel(lit.facing, n) * fresnel(seen.facing, n), density + once
+        once = part / (8 * wi.z * across * pole)
+        both = fresnel(lit.facing, n) * fresnel(seen.facing, n)
+        value = value + distribution.density(m) * once * both
+        density = density + distribution.sample_density(m) / m.z * once
     return value, density
 
 
 @dataclass
-class CavityMirrors:
+class CavityMirrors(Lobe):
     """The lobe of the interfaces, once and twice mirrored, drawn as it happens: weights are Fresnel's terms."""
 
     distribution: Distribution
     n: Any
-    typical: Callable[[Any], Any]  # w -> cosine at which facets are met along w
+    mirrored: Callable[[Any], Any]  # w -> share of the light along w that facets mirror, roughly
 
     def share(self, wi: Any) -> Any:
-        """F at a typical facet."""
-        return fresnel(self.typical(wi), self.n)
+        """That share."""
+        return self.mirrored(wi)
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """(f cos_o, density); what would bounce a third time is not returned."""
         m = dr.normalize(wi + wo)
         facing = dr.dot(wi, m)
         seen = cavity_visible_and_lit(facing, facing, wi.z, wo.z, m.z) / dr.square(facing)
-        once = self.distribution.density(m) * seen / (4 * wi.z)
+        once = seen / (4 * wi.z)
         twice, density = mirrored_twice(self.distribution, self.n, wi, wo)
-        return once * fresnel(facing, self.n) + twice, once + density
+        value = self.distribution.density(m) * once * fresnel(facing, self.n)
+        return value + twice, self.distribution.sample_density(m) / m.z * once + density
 
     def draw(self, wi: Any, u: Any, v: Any) -> Any:
         """Where a ray goes that enters a cavity anywhere; from below if it bounces a third time."""
@@ -365,7 +374,9 @@ class More:
 
     def native(self) -> More:
         """The same for the active variant."""
-        return type(self)(self.missing.native(), self.mean, self.left.native(), self.white)
+        numbers = self.mean, self.white
+        mean, white = numbers if dr.is_jit_v(mi.Float) else (number.numpy().item() for number in numbers)
+        return type(self)(self.missing.native(), mean, self.left.native(), white)
 
     def __call__(self, wi: Any, wo: Any, scale: Any) -> Any:
         """f per steradian, for a body of this ``scale`` Q, a number."""

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from ...errors import ParameterError
 from ...lobes import Lifted, Lobe, LobeModel, diffuse, glossy
 from ...microfacet.distributions import GGX, Beckmann, Distribution, Gaussian
 from ...microfacet.numerics import clamp
-from ...microfacet.sampling import cosine_hemisphere, reflect
 from ...microfacet.tables import Made
 from ...parameters import Axes, Choice, Colour, Flag, Ior, Usual, constant, numbers, varies
-from .body import GRAZING, body_albedo, body_integral, fresnel, interface, outer_reflectance, transmitted
-from .facets import FACETS, Facets
-from .table import IntegralTable, steps
+from .body import body_albedo
+from .facets import FACETS
+from .interreflection import CavityMirrors
+from .light import Known, Light
+from .lobes import Body, Interface, lift, mirrored_share
+from .microgeometry import ExplicitCavities
+from .table import steps
 
 CITATION = """\
 @article{Meneveaux2018Rendering,
@@ -53,6 +53,7 @@ class InterfacedLambertian(LobeModel):
     """
 
     citation = CITATION
+    geometry = ExplicitCavities
 
     diffuse_reflectance = Colour("albedo of the body below the interface, K_d", 0.5)
     int_ior = Ior("index of refraction of the body", "bk7")
@@ -66,43 +67,54 @@ class InterfacedLambertian(LobeModel):
         high=1.5,
         usually=Usual(0.02, 1, logarithmic=True),
     )
-    scattering = Choice("how often light meets facets", options=("single",))
-    approximate = Flag("whether a coarse rule sums over the facets: as fast, or faster, with errors of 3 %", False)
+    scattering = Choice(
+        "how often light meets facets at most: once, twice, or as often as it takes, in V-cavities",
+        options=("single", "double", "multiple"),
+    )
+    approximate = Flag("whether a coarse rule sums over the facets, with errors of 3 %, instead of a table", False)
 
     def configure(self, given: set[str]) -> None:
-        """Complain of what does not go together."""
+        """Settle the masking, and complain of what does not go together."""
+        if self.scattering != "single":
+            if "masking" in given and self.masking != "vcavity":
+                how = f'masking = {self.masking!r}: scattering = "{self.scattering}" is in V-cavities'
+                raise ParameterError(f'{how}; use masking = "vcavity", or leave it out.')
+            self.masking = "vcavity"
         self.check()
-        self.table = Made()
+        self.known = Made()
 
     def update(self) -> None:
-        """Bring the table of the integral up to date, if parameters vary little enough for one."""
-        if not self._tabulated():
-            self.table = Made()
+        """Bring up to date what is made from the parameters that do not vary over the surface."""
+        tabulated, constants = self._constants()
+        if not (tabulated or constants):
+            self.known = Made(Known())
             return
-        make = partial(IntegralTable.made, DISTRIBUTIONS[self.distribution], FACETS[self.masking]())
+        kind, facets = DISTRIBUTIONS[self.distribution], FACETS[self.masking]()
+        self.known.update(partial(Known.made, kind, facets, self.scattering, tabulated, self.rule), *constants)
+
+    @property
+    def rule(self) -> tuple[int, int]:
+        """Rings and azimuths of sums for every call."""
+        return COARSE if self.approximate else RULE
+
+    def _constants(self) -> tuple[bool, list[Any]]:
+        """(whether tables are made, from what: the relative index, and the roughness or both ends of it).
+
+        Without tables, the roughness is that along x and y, if many bounces need it.
+        """
+        single, textures = self.scattering == "single", list(self.alpha.textures.items())
+        if single and (varies(self.int_ior) or varies(self.ext_ior)):
+            return False, []
         n = self._relative_index(constant("int_ior", self.int_ior), constant("ext_ior", self.ext_ior))
-        ((name, alpha),) = self.alpha.textures.items()
-        if not varies(alpha):
-            self.table.update(make, n, self._least(type(self).alpha.clamp(constant(name, alpha))))
-            return
-        low, high = (float(np.clip(end, type(self).alpha.low, type(self).alpha.high)) for end in self._extent(alpha))
-        self.table.update(make, n, *steps(low, high))
-
-    def _tabulated(self) -> bool:
-        """Whether the integral depends on few enough numbers."""
-        if self.approximate or not self.alpha.isotropic or varies(self.int_ior) or varies(self.ext_ior):
-            return False
-        (alpha,) = self.alpha.textures.values()
-        return not varies(alpha) or bool(self._shown(alpha))
-
-    @staticmethod
-    def _shown(texture: Any) -> list[np.ndarray]:
-        """The numbers that Mitsuba shows of a texture."""
-        return [found for _, found in numbers(texture, differentiated=True)]
-
-    def _extent(self, texture: Any) -> tuple[float, float]:
-        shown = self._shown(texture)
-        return min(found.min() for found in shown), max(found.max() for found in shown)
+        if self.scattering == "multiple" or not any(varies(texture) for _, texture in textures):
+            alphas = [self._least(type(self).alpha.clamp(constant(name, texture))) for name, texture in textures]
+            tabulated = self.alpha.isotropic and not self.approximate
+            return tabulated, [n, *alphas] if tabulated or not single else []
+        shown = [found.ravel() for _, found in numbers(textures[0][1], differentiated=True)]
+        if self.approximate or not (self.alpha.isotropic and shown):
+            return False, [] if single else [n]
+        ends = np.clip([min(map(np.min, shown)), max(map(np.max, shown))], type(self).alpha.low, type(self).alpha.high)
+        return True, [n, *steps(*map(float, ends))]
 
     def check(self) -> None:
         """Ranges, the order of the two indices, and where Smith's masking of the Gaussian ends."""
@@ -158,13 +170,11 @@ class InterfacedLambertian(LobeModel):
         distribution, facets = DISTRIBUTIONS[self.distribution](*alphas), FACETS[self.masking]()
         scale = body_albedo(self.at("diffuse_reflectance", si, active), n)
 
-        def integral(wi: Any, wo: Any) -> Any:
-            if self.table.result is not None:
-                return self.table.result.at(alphas[0], wi, wo)
-            return body_integral(distribution, facets, n, wi, wo, *(COARSE if self.approximate else RULE))
-
-        lobes: list[Lobe] = [Interface(distribution, facets, n), Body(distribution, n, scale, integral)]
-        return [Lifted(lobe, lift) for lobe in lobes]
+        light = Light(distribution, facets, n, self.rule, self.known.result)
+        interface: Lobe = Interface(distribution, facets, n)
+        if self.scattering != "single":
+            interface = CavityMirrors(distribution, n, partial(mirrored_share, distribution, n))
+        return [Lifted(lobe, lift) for lobe in (interface, Body(distribution, n, scale, light))]
 
     def _relative_index(self, inner: Any, outer: Any) -> Any:
         return clamp(inner / outer, 1, 10)
@@ -172,61 +182,3 @@ class InterfacedLambertian(LobeModel):
     def _least(self, alpha: Any) -> Any:
         """The roughness, or where Smith's masking of the Gaussian ends."""
         return dr.minimum(alpha, Gaussian.largest_smith) if self._ill_posed() else alpha
-
-
-def lift(w: Any) -> Any:
-    """``w``, raised to a cosine of `GRAZING` at least."""
-    return type(w)(w.x, w.y, dr.maximum(w.z, GRAZING))
-
-
-def typical_cosine(distribution: Distribution, w: Any) -> Any:
-    """Cosine at which facets are met along ``w``, roughly: rough ones face it more than the surface does."""
-    tilt = dr.sqrt(dr.square(distribution.alpha_u * w.x) + dr.square(distribution.alpha_v * w.y) + 1e-14)
-    return dr.minimum(w.z + tilt, 1)
-
-
-@dataclass
-class Interface(Lobe):
-    """The lobe of the interfaces (Eq. 4), drawn by visible normals."""
-
-    distribution: Distribution
-    facets: Facets
-    n: Any
-
-    def share(self, wi: Any) -> Any:
-        """F at a typical facet."""
-        return fresnel(typical_cosine(self.distribution, wi), self.n)
-
-    def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
-        """F D G / (4 cos_i), and the density of visible normals over 4 i.m."""
-        m = dr.normalize(wi + wo)
-        density = self.facets.visible_density(self.distribution, wi, m) / (4 * dr.dot(wi, m))
-        return interface(self.distribution, self.facets, self.n, wi, wo), density
-
-    def draw(self, wi: Any, u: Any, v: Any) -> Any:
-        """Mirrored in a visible normal."""
-        return reflect(wi, self.facets.visible_normal(self.distribution, wi, u, v))
-
-
-@dataclass
-class Body(Lobe):
-    """The lobe of the bodies below the interfaces (Eq. 13), drawn by cosine."""
-
-    distribution: Distribution
-    n: Any
-    scale: Any  # Q, a spectrum
-    integral: Callable[[Any, Any], Any]  # (wi, wo) -> I
-
-    def share(self, wi: Any) -> Any:
-        """What a typical facet lets in, and out again."""
-        inside = transmitted(typical_cosine(self.distribution, wi), self.n)
-        return inside * (1 - outer_reflectance(self.n)) * dr.mean(mi.UnpolarizedSpectrum(self.scale))
-
-    def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
-        """Q I cos_o / pi, and the cosine over pi."""
-        cosine = wo.z / dr.pi
-        return self.scale * (self.integral(wi, wo) * cosine), cosine
-
-    def draw(self, wi: Any, u: Any, v: Any) -> Any:
-        """By cosine."""
-        return cosine_hemisphere(v.x, v.y)
