@@ -89,7 +89,7 @@ def body_albedo(reflectance: Any, n: Any) -> Any:
 
 
 def body_integral(
-    distribution: Distribution, facets: Facets, n: Any, wi: Any, wo: Any, rings: int, azimuths: int
+    distribution: Distribution, facets: Facets, n: Any, wi: Any, wo: Any, rings: int = 12, azimuths: int = 32
 ) -> Any:
     """I(i, o) = int T(im) T(om) D G im om / (cos_i cos_o) dm (Eq. 13), which is 1 for flat facets of n = 1.
 
