@@ -20,6 +20,7 @@ CASES = {  # description, and a parameter to move
     "lambertsphere": ({"type": "lambertsphere"}, "reflectance.value"),
     "chandrasekhar": ({"type": "chandrasekhar"}, "reflectance.value"),
     "interfacedlambertian": ({"type": "interfacedlambertian"}, "alpha.value"),
+    "cavities": ({"type": "interfacedlambertian", "scattering": "multiple"}, "alpha.value"),
     "stretched": ({"type": "interfacedlambertian", "alpha_u": 0.2, "alpha_v": 0.5}, "alpha_u.value"),
     "orennayar": ({"type": "orennayar"}, "reflectance.value"),
     "deon": ({"type": "deon", "base": BASE}, "tau_0.value"),

@@ -70,6 +70,10 @@ SPREAD = {
         "textured": {"alpha": {"type": "checkerboard", "color0": 0.1, "color1": 0.5}},
         "textured index": {"int_ior": {"type": "checkerboard", "color0": 1.2, "color1": 1.8}, "alpha": 0.4},
         "approximate": {"approximate": True, "alpha": 0.4},
+        "double": {"scattering": "double", "alpha": 0.5, "diffuse_reflectance": 0.9},
+        "double gaussian": {"scattering": "double", "distribution": "gaussian", "alpha_u": 0.2, "alpha_v": 0.5},
+        "multiple": {"scattering": "multiple", "distribution": "ggx", "alpha": 0.7, "diffuse_reflectance": 1.0},
+        "multiple anisotropic": {"scattering": "multiple", "alpha_u": 0.3, "alpha_v": 0.7},
     },
     "vgroove": {
         "default": {},

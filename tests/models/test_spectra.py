@@ -33,6 +33,7 @@ COLOURS = {
     "fast": ({"type": "lambertsphere", "variant": "fast"}, "reflectance"),
     "chandrasekhar": ({"type": "chandrasekhar"}, "reflectance"),
     "interfacedlambertian": ({"type": "interfacedlambertian"}, "diffuse_reflectance"),
+    "cavities": ({"type": "interfacedlambertian", "scattering": "multiple"}, "diffuse_reflectance"),
     "orennayar": ({"type": "orennayar"}, "reflectance"),
 }
 

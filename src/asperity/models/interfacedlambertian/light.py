@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 
 from ...microfacet.distributions import Distribution
 from ...microfacet.tables import array_types
@@ -94,7 +93,7 @@ class Light:
         value = value + scale * mixed + scale * scale * twice
         if known.more is None:
             return value
-        if isinstance(scale, mi.UnpolarizedSpectrum):
+        if dr.depth_v(scale) > dr.depth_v(wi.z):
             return value + type(scale)([known.more(wi, wo, channel) for channel in scale])
         return value + known.more(wi, wo, scale)
 
