@@ -45,6 +45,22 @@ MATTE |= {
     for variant in variants
 }
 MATTE["chandrasekhar"] = {"type": "chandrasekhar"}
+FACETS = {"type": "interfacedlambertian", "distribution": "ggx", "alpha": 0.3}
+CHECKED = {"type": "checkerboard", "color0": 0.1, "color1": 0.6}
+PLASTIC = {
+    "roughplastic, GGX": {"type": "roughplastic", "distribution": "ggx", "alpha": 0.3},
+    "interfacedlambertian": FACETS,
+    "interfacedlambertian, Beckmann": {**FACETS, "distribution": "beckmann"},
+    "interfacedlambertian, V-cavities": {**FACETS, "masking": "vcavity"},
+    "interfacedlambertian, textured alpha": {**FACETS, "alpha": CHECKED},
+    "interfacedlambertian, anisotropic": {
+        "type": FACETS["type"],
+        "distribution": "ggx",
+        "alpha_u": 0.3,
+        "alpha_v": 0.31,
+    },
+    "interfacedlambertian, approximate": {**FACETS, "approximate": True},
+}
 LANES = 1 << 21
 
 
@@ -145,10 +161,11 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="few, small frames")
     parser.add_argument("--only", help="part of a material's name")
     parser.add_argument("--matte", action="store_true", help="matte materials, against `diffuse`")
+    parser.add_argument("--plastic", action="store_true", help="interfaced ones, against `roughplastic`")
     quick, only = (args := parser.parse_args()).quick, args.only
-    if args.matte:
+    if args.matte or args.plastic:
         MATERIALS.clear()
-        MATERIALS.update(MATTE)
+        MATERIALS.update(MATTE if args.matte else PLASTIC)
     reference = next(iter(MATERIALS))
     mi.set_variant("llvm_ad_rgb")
     mi.set_log_level(mi.LogLevel.Error)

@@ -36,6 +36,19 @@ CASES = {  # description and parameters
         {"type": "micrograin", "scattering": "multiple", "tau_0": 0.4, "base": ROUGH},
         ["tau_0.value", "beta.value", "base.alpha.value"],
     ),
+    "interfacedlambertian": (
+        {"type": "interfacedlambertian", "alpha": 0.4},
+        ["alpha.value", "int_ior.value", "diffuse_reflectance.value"],
+    ),
+    "interfaced cavities": (
+        {"type": "interfacedlambertian", "masking": "vcavity", "distribution": "ggx"},
+        ["alpha.value", "int_ior.value"],
+    ),
+    "double": (
+        {"type": "interfacedlambertian", "scattering": "double", "alpha": 0.6},
+        ["alpha.value", "int_ior.value", "diffuse_reflectance.value"],
+    ),
+    "stretched": ({"type": "interfacedlambertian", "alpha_u": 0.2, "alpha_v": 0.5}, ["alpha_u.value", "int_ior.value"]),
     "multiple over vgroove": (
         {"type": "micrograin", "scattering": "multiple", "tau_0": 0.4, "base": {"type": "vgroove", "material": "Cu"}},
         ["base.eta.value"],  # by alpha, a difference is also of the directions that the base's albedo is sampled in

@@ -19,6 +19,8 @@ CASES = {
     "published": {"type": "lambertsphere", "variant": "published"},
     "fast": {"type": "lambertsphere", "variant": "fast"},
     "chandrasekhar": {"type": "chandrasekhar"},
+    "cavities": {"type": "interfacedlambertian", "alpha": 0.6, "diffuse_reflectance": 0.9, "scattering": "multiple"},
+    "interfacedlambertian": {"type": "interfacedlambertian", "alpha": 0.4, "diffuse_reflectance": 0.9},
     "orennayar": {"type": "orennayar", "sigma": 50.0},
     "deon": {"type": "deon", "material": "Au", "base": BASE},
     "merillou": {"type": "merillou", "material": "Au", "base": BASE},

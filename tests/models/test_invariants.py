@@ -56,6 +56,25 @@ SPREAD = {
         "rough": {"reflectance": 0.9, "sigma": 60.0},
         "qualitative": {"variant": "qualitative", "sigma": 40.0},
     },
+    "interfacedlambertian": {
+        "default": {},
+        "rough": {"alpha": 0.9, "distribution": "ggx", "diffuse_reflectance": 0.9},
+        "cavities": {"masking": "vcavity", "alpha": 0.6, "diffuse_reflectance": 1.0},
+        "gaussian": {"masking": "vcavity", "distribution": "gaussian", "alpha_u": 0.2, "alpha_v": 0.6},
+        "gaussian smith": {"distribution": "gaussian", "alpha": 0.3},
+        "anisotropic": {"alpha_u": 0.1, "alpha_v": 0.6, "distribution": "ggx"},
+        "anisotropic cavities": {"alpha_u": 0.5, "alpha_v": 0.2, "masking": "vcavity"},
+        "matched": {"int_ior": 1.0, "diffuse_reflectance": 0.8, "alpha": 0.5},
+        "black": {"diffuse_reflectance": 0.0},
+        "dense": {"int_ior": 2.4, "alpha": 0.1, "masking": "vcavity", "distribution": "ggx"},
+        "textured": {"alpha": {"type": "checkerboard", "color0": 0.1, "color1": 0.5}},
+        "textured index": {"int_ior": {"type": "checkerboard", "color0": 1.2, "color1": 1.8}, "alpha": 0.4},
+        "approximate": {"approximate": True, "alpha": 0.4},
+        "double": {"scattering": "double", "alpha": 0.5, "diffuse_reflectance": 0.9},
+        "double gaussian": {"scattering": "double", "distribution": "gaussian", "alpha_u": 0.2, "alpha_v": 0.5},
+        "multiple": {"scattering": "multiple", "distribution": "ggx", "alpha": 0.7, "diffuse_reflectance": 1.0},
+        "multiple anisotropic": {"scattering": "multiple", "alpha_u": 0.3, "alpha_v": 0.7},
+    },
     "vgroove": {
         "default": {},
         "gold": {"material": "Au", "alpha": 0.5},
@@ -78,7 +97,7 @@ SPREAD = {
 }
 
 QUICK = {"micrograin-gold", "vgroove-gold", "merillou-tiles", "deon-dense", "orennayar-default"}
-QUICK |= {"lambertsphere-default", "chandrasekhar-default"}
+QUICK |= {"lambertsphere-default", "chandrasekhar-default", "interfacedlambertian-default"}
 CASES = [
     pytest.param(model, case, id=name, marks=[] if name in QUICK else [pytest.mark.slow])
     for model, cases in SPREAD.items()

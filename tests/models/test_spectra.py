@@ -32,6 +32,8 @@ COLOURS = {
     "published": ({"type": "lambertsphere", "variant": "published"}, "reflectance"),
     "fast": ({"type": "lambertsphere", "variant": "fast"}, "reflectance"),
     "chandrasekhar": ({"type": "chandrasekhar"}, "reflectance"),
+    "interfacedlambertian": ({"type": "interfacedlambertian"}, "diffuse_reflectance"),
+    "cavities": ({"type": "interfacedlambertian", "scattering": "multiple"}, "diffuse_reflectance"),
     "orennayar": ({"type": "orennayar"}, "reflectance"),
 }
 

@@ -38,6 +38,7 @@ CASES = {
     "soft grooves": ('{"type": "vgroove", "max_bounces": 9, "symmetric": False, "alpha": %s}', 0.8, "vertex_a"),
     "metal": ('{"type": "vgroove", "alpha": 1.0, "reflectivity": %s}', [0.9, 0.6, 0.3], "vertex_c"),
     "albedo": ('{"type": "lambertsphere", "albedo": %s}', [0.9, 0.6, 0.3], "vertex_c"),
+    "interfaced": ('{"type": "interfacedlambertian", "alpha": %s, "approximate": True}', 0.4, "vertex_a"),
     "sigma": ('{"type": "orennayar", "sigma": %s}', 40.0, "vertex_a"),
 }
 

@@ -29,13 +29,13 @@ class Grooves:
     """A piece of surface; ``draw(rng)`` makes a groove for each lane, all of them with openings equally wide."""
 
     draw: Callable[[mi.PCG32], Shape]
-    bsdf: mi.BSDF
+    bsdf: Any  # a BSDF, or what can be sampled and evaluated like one
 
     def rays(self, wavelengths: tuple[float, ...]) -> GrooveRays:
         """The grooves for rays of these wavelengths."""
         return GrooveRays(self, opaque(mi.UnpolarizedSpectrum, *wavelengths) if mi.is_spectral else mi.Color0f())
 
-    def facets(self) -> dict[str, mi.BSDF]:
+    def facets(self) -> dict[str, Any]:
         """Both are alike."""
         return {"facets": self.bsdf}
 

@@ -34,8 +34,11 @@ def cavity_visible_and_lit(facing_i: Any, facing_o: Any, cos_i: Any, cos_o: Any,
 
 
 def cavity_visible_density(distribution: Distribution, w: Any, m: Any) -> Any:
-    """Density per steradian of the normals of `sample_cavity_visible_normal`: D <w.m> G1(w, m) / w_z."""
-    return distribution.density(m) * cavity_visible(dr.dot(w, m), w.z, m.z) / w.z
+    """Density per steradian of the normals of `sample_cavity_visible_normal`: D <w.m> G1(w, m) / w_z.
+
+    The Gaussian's is that of how it is sampled, in place of D.
+    """
+    return distribution.sample_density(m) * cavity_visible(dr.dot(w, m), w.z, m.z) / (m.z * w.z)
 
 
 def sample_cavity_visible_normal(distribution: Distribution, w: Any, u: Any, v: Any, choice: Any) -> tuple[Any, Any]:

@@ -6,6 +6,7 @@ from ..errors import ParameterError
 from .baselines.deon import DEon
 from .baselines.merillou import Merillou
 from .baselines.orennayar import OrenNayar
+from .interfacedlambertian import InterfacedLambertian
 from .lambertsphere import Chandrasekhar, LambertSphere, LambertSpherePhase
 from .micrograin import Micrograin
 from .textures import Settled
@@ -19,6 +20,7 @@ MODELS: dict[str, Any] = {
     "lambertsphere": LambertSphere,
     "chandrasekhar": Chandrasekhar,
     "orennayar": OrenNayar,
+    "interfacedlambertian": InterfacedLambertian,
 }
 """BSDF plugins by the name that a scene uses."""
 
