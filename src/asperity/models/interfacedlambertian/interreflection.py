@@ -44,11 +44,15 @@ from ...microfacet.masking import cavity_visible_and_lit
 from ...microfacet.numerics import clamp, heading
 from ...microfacet.quadrature import gauss_legendre, integrate, over_normals
 from ...microfacet.sampling import reflect
-from ...microfacet.tables import Table
+from ...microfacet.tables import Table, array_types
 from .body import GRAZING, body_albedo, fresnel, outer_reflectance, transmitted, transmitted_twice
+from .table import COSINES as NODES
+from .table import SMALLEST, Build, chebyshev, coefficients, coordinates
 
 OUT_OF_PLANE = (0.31865891, 0.05074302), (0.69997913, 0.31023642), (0.96318908, 0.63902056)
 """(cos w, weight): Gauss's rule for means over the angle w out of a cavity's plane, by cos^2 w."""
+TABLE = Build(16, 32, (16, 32), 0.1)
+"""How those of c_1 and c_2 are made."""
 TILTS, PARTS = 32, 12
 """Nodes of the table of tau."""
 POLE = 1e-3
@@ -132,8 +136,8 @@ class EvenTransmittance:
         axes = np.linspace(0, 1, TILTS), np.linspace(0, 1, PARTS), np.linspace(0, 1, PARTS)
         root, a, b = (np.maximum(x.ravel(), 0.01) for x in np.meshgrid(*axes, indexing="ij"))
         cos_m = np.maximum(1 - root * root, 1e-3)
-        nodes = (Float(x.astype(np.float32)) for x in (a / (2 * cos_m), b / (2 * cos_m), cos_m))
-        return cls(Table.of((TILTS, PARTS, PARTS), [even_transmittance(*nodes, n)]))
+        a, b, cos_m = (Float(x.astype(np.float32)) for x in (a / (2 * cos_m), b / (2 * cos_m), cos_m))
+        return cls(Table.of((TILTS, PARTS, PARTS), [even_transmittance(a, b, cos_m, n)]))
 
     def __call__(self, a: Any, b: Any, cos_m: Any) -> Any:
         """Its value."""
@@ -176,6 +180,36 @@ def two_bounces(
     lower = dr.select(wi.z < wo.z, wi, wo)
     once, twice = over_normals(of_cavity, distribution, lower, (n, tau, wi, wo), rings, azimuths)
     return once * (2 / math.pi), twice * (2 / math.pi)
+
+
+@dataclass
+class TwoBounces:
+    """`two_bounces` of one index of refraction and one roughness, as tables."""
+
+    mixed: Table  # coefficients of the root of c_1, as of `table`
+    both: Table  # of c_2
+    k: Any
+
+    @classmethod
+    def made(cls, kind: type[Distribution], n: Any, alpha: Any) -> TwoBounces:
+        """The tables; if ``n`` or ``alpha`` carry derivatives, so do they."""
+        Float, Vector = array_types("scattering")
+        n = Float(n)
+        tau = EvenTransmittance.made(n)
+
+        def values(alpha: Any, wi: Any, wo: Any) -> tuple:
+            once, twice = two_bounces(kind(alpha, alpha), n, tau, wi, wo, *TABLE.rule)
+            return dr.sqrt(dr.maximum(once, SMALLEST)), twice
+
+        shape = NODES, NODES
+        mixed, both = (Table(c, shape, TABLE.terms).native() for c in coefficients(TABLE, values, Float(alpha), Vector))
+        return cls(mixed, both, TABLE.near * dr.detach(alpha))
+
+    def __call__(self, wi: Any, wo: Any) -> tuple[Any, Any]:
+        """(c_1, c_2)."""
+        x_i, x_o, t = coordinates(self.k, wi, wo)
+        once, twice = (chebyshev(table.at(x_i, x_o), t) for table in (self.mixed, self.both))
+        return dr.square(once), dr.maximum(twice, 0)
 
 
 def mirrored_twice(distribution: Distribution, n: Any, wi: Any, wo: Any) -> tuple[Any, Any]:

@@ -11,6 +11,7 @@ which are dense towards the horizon, where I varies over angles as large as the 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -70,21 +71,30 @@ class IntegralTable:
             levels = min(LEVELS, 1 + math.ceil(octaves / math.log(RATIO) - 1e-6))
             alpha = low * np.exp(np.linspace(0, octaves, levels))
         Float, Vector = array_types("alpha")
-        table = _coefficients(build, kind, facets, Float(n), Float(alpha), Vector)
+        n = Float(n)
+
+        def root(alpha: Any, wi: Any, wo: Any) -> tuple:
+            return (dr.sqrt(dr.maximum(body_integral(kind(alpha, alpha), facets, n, wi, wo, *build.rule), SMALLEST)),)
+
+        (table,) = coefficients(build, root, Float(alpha), Vector)
         return cls(Table(table, (levels, COSINES, COSINES), build.terms).native(), low, octaves, build.near)
 
     def at(self, alpha: Any, wi: Any, wo: Any) -> Any:
         """I(i, o)."""
         if self.table.shape[0] == 1:
             alpha = dr.detach(alpha)  # the table knows, whose nodes keep their places
-        (sin_i, cos_i), (sin_o, cos_o) = inclination(wi), inclination(wo)
-        cos_phi = (wi.x * wo.x + wi.y * wo.y) / dr.maximum(sin_i * sin_o, 1e-8)
+        x_i, x_o, t = coordinates(self.near * alpha, wi, wo)
         level = dr.log(alpha / self.low) / self.octaves
-        k = self.near * alpha
-        most = dr.rcp(dr.log(1 + dr.rcp(k)))
-        x_i, x_o = (dr.log(1 + (1 - sin / (1 + cos)) / k) * most for sin, cos in ((sin_i, cos_i), (sin_o, cos_o)))
-        t = 2 * dr.sqrt(dr.maximum((1 + cos_phi) / 2, 1e-12)) - 1
-        return dr.square(chebyshev(self.table.at(level, x_i, x_o), dr.minimum(t, 1)))
+        return dr.square(chebyshev(self.table.at(level, x_i, x_o), t))
+
+
+def coordinates(k: Any, wi: Any, wo: Any) -> tuple[Any, Any, Any]:
+    """(x of wi, x of wo, t)."""
+    (sin_i, cos_i), (sin_o, cos_o) = inclination(wi), inclination(wo)
+    cos_phi = (wi.x * wo.x + wi.y * wo.y) / dr.maximum(sin_i * sin_o, 1e-8)
+    most = dr.rcp(dr.log(1 + dr.rcp(k)))
+    x_i, x_o = (dr.log(1 + (1 - sin / (1 + cos)) / k) * most for sin, cos in ((sin_i, cos_i), (sin_o, cos_o)))
+    return x_i, x_o, dr.minimum(2 * dr.sqrt(dr.maximum((1 + cos_phi) / 2, 1e-12)) - 1, 1)
 
 
 def steps(low: float, high: float) -> tuple[float, float]:
@@ -102,12 +112,13 @@ def chebyshev(coefficients: Any, t: Any) -> Any:
     return coefficients[0] + t * last - before
 
 
-def _coefficients(build: Build, kind: type[Distribution], facets: Facets, n: Any, alpha: Any, Vector: Any) -> Any:
+def coefficients(build: Build, values: Callable[[Any, Any, Any], tuple], alpha: Any, Vector: Any) -> list[Any]:
     """Coefficients of each roughness and pair of directions, innermost, by least squares at a few azimuths.
 
-    Of either order of a pair they are the same, and so found for one.
+    They are those of each of ``values(alpha, wi, wo)``. Of either order of a pair they are the same, and so found for
+    one.
     """
-    Float, levels = type(n), dr.width(alpha)
+    Float, levels = type(alpha), dr.width(alpha)
     UInt = dr.uint32_array_t(Float)
     first, second = np.triu_indices(COSINES)
     pair = np.zeros((COSINES, COSINES), dtype=np.uint32)
@@ -127,16 +138,17 @@ def _coefficients(build: Build, kind: type[Distribution], facets: Facets, n: Any
 
     (sin_i, cos_i), (sin_o, cos_o) = node(first), node(second)
     wi, wo = Vector(sin_i, 0, cos_i), Vector(sin_o * cos_phi, sin_o * sin_phi, cos_o)
-    root = dr.sqrt(dr.maximum(body_integral(kind(alpha, alpha), facets, n, wi, wo, *build.rule), SMALLEST))
-    dr.eval(root)
+    functions = values(alpha, wi, wo)
+    dr.eval(functions)
     fit = np.linalg.pinv(np.polynomial.chebyshev.chebvander(2 * np.cos(phi / 2) - 1, build.terms - 1))
     shape = levels * first.size, build.terms, build.azimuths
     number, term, azimuth = (UInt(index.ravel().astype(np.uint32)) for index in np.indices(shape))
     weight = dr.gather(Float, Float(fit.ravel()), term * build.azimuths + azimuth)
-    found = dr.block_sum(weight * dr.gather(Float, root, number * build.azimuths + azimuth), build.azimuths)
-    entry = (np.arange(levels)[:, None, None, None] * first.size + pair[..., None]) * build.terms + np.arange(
-        build.terms
-    )
-    entries = dr.gather(Float, found, UInt(entry.ravel().astype(np.uint32)))
+    entry = (np.arange(levels)[:, None, None, None] * first.size + pair[..., None]) * build.terms
+    entry = UInt((entry + np.arange(build.terms)).ravel().astype(np.uint32))
+    entries = []
+    for function in functions:
+        found = dr.block_sum(weight * dr.gather(Float, function, number * build.azimuths + azimuth), build.azimuths)
+        entries.append(dr.gather(Float, found, entry))
     dr.eval(entries)
     return entries
