@@ -89,13 +89,13 @@ def body_albedo(reflectance: Any, n: Any) -> Any:
 
 
 def body_integral(
-    distribution: Distribution, facets: Facets, n: Any, wi: Any, wo: Any, rings: int = 8, azimuths: int = 32
+    distribution: Distribution, facets: Facets, n: Any, wi: Any, wo: Any, rings: int, azimuths: int
 ) -> Any:
     """I(i, o) = int T(im) T(om) D G im om / (cos_i cos_o) dm (Eq. 13), which is 1 for flat facets of n = 1.
 
-    Reciprocal to rounding, and independent of the azimuth where ``distribution`` is. The error is that of the rule:
-    with 8 x 32 nodes, .7 % at the 95th, 2 % at the 99th percentile of all directions and parameters, most of it within
-    6 degrees of the horizon. ``wi`` and ``wo`` are above it by `GRAZING` at least.
+    Reciprocal to rounding, and independent of the azimuth where ``distribution`` is. ``wi`` and ``wo`` are above the
+    horizon by `GRAZING` at least. The error is that of the rule, most of it within 6 degrees of the horizon: with
+    12 x 32 nodes, .3 % at the 95th, .5 to .9 % at the 99th percentile of directions and parameters.
     """
 
     def term(m: Any, captured: tuple) -> tuple[Any]:

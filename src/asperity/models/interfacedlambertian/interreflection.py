@@ -47,7 +47,7 @@ from ...microfacet.sampling import reflect
 from ...microfacet.tables import Table, array_types
 from .body import GRAZING, body_albedo, fresnel, outer_reflectance, transmitted, transmitted_twice
 from .table import COSINES as NODES
-from .table import SMALLEST, Build, chebyshev, coefficients, coordinates
+from .table import SMALLEST, Build, chebyshev, coefficients, coordinates, nearness
 
 OUT_OF_PLANE = (0.31865891, 0.05074302), (0.69997913, 0.31023642), (0.96318908, 0.63902056)
 """(cos w, weight): Gauss's rule for means over the angle w out of a cavity's plane, by cos^2 w."""
@@ -203,7 +203,7 @@ class TwoBounces:
 
         shape = NODES, NODES
         mixed, both = (Table(c, shape, TABLE.terms).native() for c in coefficients(TABLE, values, Float(alpha), Vector))
-        return cls(mixed, both, TABLE.near * dr.detach(alpha))
+        return cls(mixed, both, nearness(TABLE.near, dr.detach(alpha)))
 
     def __call__(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """(c_1, c_2)."""

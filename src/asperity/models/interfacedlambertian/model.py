@@ -40,7 +40,7 @@ MATCHED = 1e-3
 """Excess of the outer index that is taken for none: that of air over vacuum is less."""
 APART = 1.01
 """Ratio of the indices from which on derivatives by them are those of values nearby."""
-RULE, COARSE = (8, 32), (4, 8)
+RULE, COARSE = (12, 32), (4, 8)
 """Rings and azimuths of the integral over normals, and those of ``approximate``."""
 
 
@@ -186,7 +186,7 @@ def typical_cosine(distribution: Distribution, w: Any) -> Any:
 
 
 @dataclass
-class Interface:
+class Interface(Lobe):
     """The lobe of the interfaces (Eq. 4), drawn by visible normals."""
 
     distribution: Distribution
@@ -209,7 +209,7 @@ class Interface:
 
 
 @dataclass
-class Body:
+class Body(Lobe):
     """The lobe of the bodies below the interfaces (Eq. 13), drawn by cosine."""
 
     distribution: Distribution

@@ -22,12 +22,14 @@ from ...microfacet.distributions import Distribution
 from ...microfacet.ggx import inclination
 from ...microfacet.tables import Table, array_types
 from .body import GRAZING, body_integral
-from .facets import CavityFacets, Facets
+from .facets import CavityFacets, Facets, SmithFacets
 
 COSINES = 32
 """Nodes of either direction."""
 RATIO, LEVELS = 1.25, 24
 """Largest ratio of two roughnesses that follow each other, as long as there are no more than these."""
+SMOOTHEST = 3e-3
+"""Least k."""
 SMALLEST = 1e-12
 """Of I, so that its root has derivatives."""
 
@@ -41,10 +43,13 @@ class Build(NamedTuple):
     near: float  # k over the roughness
 
 
-SMITH = Build(8, 12, (16, 48), 0.3)
-CAVITIES = Build(16, 48, (32, 64), 0.1)
-CAVITIES_VARIED = Build(8, 24, (32, 64), 0.1)
-"""Cavities have kinks; of many roughnesses, half the terms are as many numbers as there shall be."""
+BUILDS = {
+    (SmithFacets, False): Build(8, 24, (32, 64), 0.3),
+    (SmithFacets, True): Build(8, 12, (16, 48), 0.3),
+    (CavityFacets, False): Build(16, 48, (32, 64), 0.1),
+    (CavityFacets, True): Build(8, 24, (32, 64), 0.1),
+}
+"""By the masking, and whether for many roughnesses: those cost time and memory. Cavities have kinks."""
 
 
 @dataclass
@@ -62,9 +67,7 @@ class IntegralTable:
 
         If n or alpha carry derivatives, so does the table.
         """
-        build = SMITH
-        if isinstance(facets, CavityFacets):
-            build = CAVITIES if high is None else CAVITIES_VARIED
+        build = BUILDS[type(facets), high is not None]
         low, octaves, levels = 1.0, 1.0, 1
         if high is not None:
             low, octaves = alpha, math.log(high / alpha)
@@ -83,7 +86,7 @@ class IntegralTable:
         """I(i, o)."""
         if self.table.shape[0] == 1:
             alpha = dr.detach(alpha)  # the table knows, whose nodes keep their places
-        x_i, x_o, t = coordinates(self.near * alpha, wi, wo)
+        x_i, x_o, t = coordinates(nearness(self.near, alpha), wi, wo)
         level = dr.log(alpha / self.low) / self.octaves
         return dr.square(chebyshev(self.table.at(level, x_i, x_o), t))
 
@@ -102,6 +105,11 @@ def steps(low: float, high: float) -> tuple[float, float]:
     step = math.log(RATIO)
     below, above = math.floor(math.log(low) / step + 1e-6), math.ceil(math.log(high) / step - 1e-6)
     return RATIO**below, RATIO ** max(above, below + 1)
+
+
+def nearness(near: float, alpha: Any) -> Any:
+    """k, but for facets so smooth that nodes for them would be missed elsewhere."""
+    return dr.maximum(near * alpha, SMOOTHEST)
 
 
 def chebyshev(coefficients: Any, t: Any) -> Any:
@@ -128,7 +136,7 @@ def coefficients(build: Build, values: Callable[[Any, Any, Any], tuple], alpha: 
     phi = (np.arange(build.azimuths) + 0.5) * math.pi / build.azimuths
     sin_phi, cos_phi = (dr.gather(Float, Float(f(phi)), azimuth) for f in (np.sin, np.cos))
     alpha = dr.gather(Float, alpha, level)
-    k = build.near * dr.detach(alpha)
+    k = nearness(build.near, dr.detach(alpha))
 
     def node(which: Any) -> tuple[Any, Any]:
         """(sine, cosine) of a pair's first or second direction."""
