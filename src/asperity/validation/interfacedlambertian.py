@@ -168,6 +168,9 @@ def by_bounce(effort: Effort) -> Section:
         for k, name in enumerate(("one bounce", "two bounces")):
             truth = Estimate(*(part[:, k][away] for part in measured.values))
             findings.append(agreement(f"α {alpha:g}, {name}", truth, model[:, k][away], effort.tiles, QUADRATURE))
+            sums = Estimate(*together(measured, k, away))
+            found = (model[:, k] * away[..., None]).sum(axis=1)
+            findings.append(agreement(f"α {alpha:g}, {name}, cells together", sums, found, effort.tiles, QUADRATURE))
         rival = roughplastic(alpha, 1.5, measured)
         for name, values, traced in (
             ("double", model[:, :2].sum(axis=1), Estimate(*_first(measured, 2))),
@@ -194,6 +197,12 @@ def by_bounce(effort: Effort) -> Section:
         [Table(("model", "α", *(f"K_d {albedo:g}" for albedo in ALBEDOS)), rows)],
         pictures,
     )
+
+
+def together(measured: Measurement, order: int, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Value and error of the sum over these cells, whose errors are all but independent: (directions, channels)."""
+    value, error = (part[:, order] * cells[..., None] for part in measured.values)
+    return value.sum(axis=1), np.sqrt(np.square(error).sum(axis=1))
 
 
 def _first(measured: Measurement, count: int) -> tuple[np.ndarray, np.ndarray]:
