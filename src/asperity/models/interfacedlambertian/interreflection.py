@@ -419,7 +419,10 @@ def body_share(body: Callable[[Any, Any], Any], wi: Any, cosines: int, azimuths:
     Float, Vector = type(wi.z), type(wi)
     UInt = dr.uint32_array_t(Float)
     (root, share), size = np.array(gauss_legendre(cosines)), cosines * azimuths
-    cos, turn = np.repeat(root**2, azimuths), np.tile((np.arange(azimuths) + 0.5) / azimuths, cosines) * 2 * np.pi
+    cos, turn = (
+        np.repeat(np.maximum(root**2, GRAZING), azimuths),
+        np.tile((np.arange(azimuths) + 0.5) / azimuths, cosines) * 2 * np.pi,
+    )
     sin, weight = np.sqrt(1 - cos * cos), np.repeat(share * root**3, azimuths) * (4 * np.pi / azimuths)
     nodes = dr.width(wi)
     parts = sin * np.cos(turn), sin * np.sin(turn), cos, weight
