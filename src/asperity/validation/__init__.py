@@ -8,13 +8,14 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import UnknownNameError
-from . import lambertsphere, micrograin, vgroove
+from . import interfacedlambertian, lambertsphere, micrograin, vgroove
 from .report import FULL, QUICK, Effort, Report, Section
 
 PAPERS: dict[str, Callable[[Effort], Iterator[Section]]] = {
     "micrograin": micrograin.sections,
     "vgroove": vgroove.sections,
     "lambertsphere": lambertsphere.sections,
+    "interfacedlambertian": interfacedlambertian.sections,
 }
 """What makes the sections of a model's report, by the model's name."""
 

@@ -8,8 +8,7 @@ import pytest
 
 from asperity.lab import evaluate
 from asperity.models.interfacedlambertian import body
-from asperity.models.interfacedlambertian.facets import FACETS
-from asperity.models.interfacedlambertian.model import DISTRIBUTIONS
+from asperity.models.interfacedlambertian.facets import DISTRIBUTIONS, FACETS
 
 KINDS = [("beckmann", "smith"), ("ggx", "smith"), ("beckmann", "vcavity"), ("ggx", "vcavity"), ("gaussian", "vcavity")]
 MANY = 64, 128

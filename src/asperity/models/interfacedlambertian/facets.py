@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ...microfacet import ggx
-from ...microfacet.distributions import GGX, Beckmann, Distribution
+from ...microfacet.distributions import GGX, Beckmann, Distribution, Gaussian
 from ...microfacet.masking import (
     cavity_visible_and_lit,
     cavity_visible_density,
@@ -89,5 +89,7 @@ class SmithFacets:
         return sample_cavity_visible_normal(distribution, w, v.x, v.y, u)[0]
 
 
+DISTRIBUTIONS: dict[str, type[Distribution]] = {"beckmann": Beckmann, "ggx": GGX, "gaussian": Gaussian}
+"""By the name that a scene uses."""
 FACETS: dict[str, type[Facets]] = {"smith": SmithFacets, "vcavity": CavityFacets}
 """By the name that a scene uses for the masking."""

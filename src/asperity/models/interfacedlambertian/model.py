@@ -10,12 +10,12 @@ import numpy as np
 
 from ...errors import ParameterError
 from ...lobes import Lifted, Lobe, LobeModel, diffuse, glossy
-from ...microfacet.distributions import GGX, Beckmann, Distribution, Gaussian
+from ...microfacet.distributions import Gaussian
 from ...microfacet.numerics import clamp
 from ...microfacet.tables import Made
 from ...parameters import Axes, Choice, Colour, Flag, Ior, Usual, constant, numbers, varies
 from .body import body_albedo
-from .facets import FACETS
+from .facets import DISTRIBUTIONS, FACETS
 from .interreflection import CavityMirrors
 from .light import Known, Light
 from .lobes import Body, Interface, lift, mirrored_share
@@ -34,8 +34,6 @@ CITATION = """\
   year    = {2018},
   doi     = {10.1109/TVCG.2017.2660490}
 }"""
-DISTRIBUTIONS: dict[str, type[Distribution]] = {"beckmann": Beckmann, "ggx": GGX, "gaussian": Gaussian}
-"""By the name that a scene uses."""
 MATCHED = 1e-3
 """Excess of the outer index that is taken for none: that of air over vacuum is less."""
 APART = 1.01
