@@ -48,6 +48,10 @@ CASES = {  # description and parameters
         {"type": "interfacedlambertian", "scattering": "double", "alpha": 0.6},
         ["alpha.value", "int_ior.value", "diffuse_reflectance.value"],
     ),
+    "bouncing": (
+        {"type": "interfacedlambertian", "scattering": "multiple", "alpha": 0.6},
+        ["alpha.value", "int_ior.value", "diffuse_reflectance.value"],
+    ),
     "stretched": ({"type": "interfacedlambertian", "alpha_u": 0.2, "alpha_v": 0.5}, ["alpha_u.value", "int_ior.value"]),
     "multiple over vgroove": (
         {"type": "micrograin", "scattering": "multiple", "tau_0": 0.4, "base": {"type": "vgroove", "material": "Cu"}},
@@ -114,7 +118,14 @@ def test_backward_through_pointers(rgb, case):
     assert dr.grad(by)[0] == pytest.approx(expected, rel=0.01)
 
 
-RENDERED = {"vgroove": 0, "non-symmetric": 0, "diffuse": 0, "multiple": 0, "multiple, by what makes its table": 1}
+RENDERED = {
+    "vgroove": 0,
+    "non-symmetric": 0,
+    "diffuse": 0,
+    "multiple": 0,
+    "bouncing": 2,
+    "multiple, by what makes its table": 1,
+}
 # Forwards, Dr.Jit 1.5 comes to a picture before it comes to what else is made of its only parameter; `lab.check` tests
 # such tables with `render_forward`.
 TOO_EARLY = ("multiple, by what makes its table", True)

@@ -41,6 +41,15 @@ COATED = {"int_ior": 1.5, "ext_ior": 1.0, "diffuse_reflectance": 0.5}
         ("lambertsphere", {"albedo": TEXTURE}, "albedo = .*not simulated.*one number"),
         ("lambertsphere", {"reflectance": TEXTURE}, "reflectance = .*not simulated.*one number"),
         ("lambertsphere", {"albedo": {"type": "uniform", "value": 0.5}}, "albedo = .*not simulated"),
+        ("interfacedlambertian", {}, 'masking = "smith": no explicit surface has it; measure "vcavity"'),
+        ("interfacedlambertian", {"scattering": "double", "alpha": TEXTURE}, "alpha = .*alike everywhere"),
+        ("interfacedlambertian", {"scattering": "double", "alpha_v": TEXTURE}, "alpha_v = .*alike everywhere"),
+        ("interfacedlambertian", {"masking": "vcavity", "diffuse_reflectance": TEXTURE}, "diffuse_reflectance = .*not"),
+        (
+            "interfacedlambertian",
+            {"masking": "vcavity", "int_ior": {**TEXTURE, "color0": 1.2, "color1": 1.5}},
+            "int_ior = .*alike everywhere",
+        ),
     ],
 )
 def test_what_is_not_simulated_is_refused(rgb, model, given, complaint):

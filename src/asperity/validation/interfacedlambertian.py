@@ -109,7 +109,9 @@ def orders(distribution: Distribution, n: float, measured: Measurement, many: Mo
         parts = (body, interface(distribution, facets, index, i, o), once * o.z, twice * o.z)
         body, mirror, once, twice = (np.array(part)[:, None] for part in parts)
         mirrors = np.array(mirrored_twice(distribution, index, i, o)[0])[:, None]
-        more = np.stack([np.array(many(i, o, mi.Float(float(one))) * o.z) for one in q], axis=1)
+        more = np.stack(
+            [np.array(many(i, o, mi.Float(float(one))) * o.z) for one in q / float(body_albedo(1, n))], axis=1
+        )
         values = np.stack([mirror + body * q, mirrors + once * q + twice * q**2, more])
         found.append(values.reshape(3, *wo.shape[:2], 3).mean(axis=2))
     return np.array(found)

@@ -33,7 +33,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -271,8 +271,10 @@ def even_light(cos_m: Any, n: Any) -> tuple[Any, Any]:
     return once / whole, twice / whole
 
 
-def more_bounces(cos_m: Any, n: Any, scale: Any) -> Any:
+def more_bounces(cos_m: Any, n: Any, scale: Any, once: Any, twice: Any) -> Any:
     """Share of diffuse light that leaves a cavity after three bounces or more, roughly; ``scale`` is Q.
+
+    Of `even_light` it takes <T> = ``once`` and <T T> = ``twice``.
 
     Every facet is taken to be lit, and to shine, evenly. Of what it shines, F_1 = 1 - cos theta meets the other one;
     of that in turn, if it is mirrored there, the share again meets a facet once more, for which the kaleidoscope gives
@@ -283,7 +285,6 @@ def more_bounces(cos_m: Any, n: Any, scale: Any) -> Any:
         M = 1 - again + again (1 - <T> + <T> W).
     """
     meet, r_e = 1 - cos_m, outer_reflectance(n)
-    once, twice = even_light(cos_m, n)
     again = dr.select(cos_m < math.sqrt(0.5), 1 - 2 * cos_m * dr.sqrt(1 - cos_m * cos_m), 0) / meet
     mirrored, taken = scale * meet * (once - twice), scale * meet * twice
     base = 1 - again * once
@@ -316,10 +317,8 @@ def mirrored_albedo(distribution: Distribution, n: Any, wi: Any) -> Any:
 class More:
     """All that bounces more than twice."""
 
-    missing: Table  # eps over the root of the cosine, and the azimuth of the first quadrant
-    mean: Any  # of eps over the hemisphere
+    missing: Table  # eps / sqrt(pi eps_mean) over the root of the cosine, and the azimuth of the first quadrant
     left: Table  # r over Q / Q_1, Q_1 being that of a body that absorbs nothing
-    white: Any  # Q_1
 
     @classmethod
     def made(
@@ -344,8 +343,11 @@ class More:
         wi = Vector(*(Float(x.astype(np.float32)) for x in (sin * np.cos(turns), sin * np.sin(turns), cos)))
         white = body_albedo(1, n)
         returned = mirrored_albedo(distribution, n, wi) + body_share(body, wi, *rule)
-        missing = Table.of((COSINES, azimuths), [dr.maximum(1 - returned, 0)])
-        return cls(missing, cls.hemispherical(missing, Float), cls.colour(distribution, n, white), white)
+        eps = Table.of((COSINES, azimuths), [dr.maximum(1 - returned, 0)])
+        mean = dr.maximum(cls.hemispherical(eps, Float), TINY)
+        missing = replace(eps, entries=eps.entries / dr.sqrt(math.pi * mean))
+        dr.eval(missing.entries)
+        return cls(missing, cls.colour(distribution, n, white))
 
     @staticmethod
     def hemispherical(missing: Table, Float: Any) -> Any:
@@ -363,25 +365,26 @@ class More:
         UInt = dr.uint32_array_t(Float)
         shade = Float(np.linspace(0, 1, SHADES).astype(np.float32))
         upright = dr.replace_shape_t(Float, (3, -1))(0, 0, 1)
+        # Of even light a table too: it is an integral, and those in the loop over normals have no derivatives backwards.
+        root = np.clip(np.linspace(0, 1, TILTS), 1e-3, 0.999)
+        even = Table.of((TILTS,), even_light(Float((1 - root * root).astype(np.float32)), n))
 
         def of_cavity(m: Any, captured: tuple) -> tuple:
-            n, white, shade = captured
-            return (more_bounces(dr.minimum(m.z, 1 - 1e-6), n, white * shade),)
+            n, white, shade, even = captured
+            cos_m = dr.minimum(m.z, 1 - 1e-6)
+            return (more_bounces(cos_m, n, white * shade, *even.at(dr.sqrt(1 - cos_m))),)
 
-        energy = over_normals(of_cavity, distribution, upright, (n, white, shade), 32, 8)[0]
+        energy = over_normals(of_cavity, distribution, upright, (n, white, shade, even), 32, 8)[0]
         whole = dr.gather(Float, energy, UInt(SHADES - 1))
         return Table.of((SHADES,), [energy / dr.maximum(whole, TINY)])
 
     def native(self) -> More:
         """The same for the active variant."""
-        numbers = self.mean, self.white
-        mean, white = numbers if dr.is_jit_v(mi.Float) else (number.numpy().item() for number in numbers)
-        return type(self)(self.missing.native(), mean, self.left.native(), white)
+        return More(self.missing.native(), self.left.native())
 
-    def __call__(self, wi: Any, wo: Any, scale: Any) -> Any:
-        """f per steradian, for a body of this ``scale`` Q, a number."""
-        eps_i, eps_o = (self._missing(w) for w in (wi, wo))
-        return self.left.at(scale / self.white)[0] * eps_i * eps_o / (math.pi * dr.maximum(self.mean, TINY))
+    def __call__(self, wi: Any, wo: Any, shade: Any) -> Any:
+        """f per steradian, for a body of this Q / Q_1, a number."""
+        return self.left.at(shade)[0] * self._missing(wi) * self._missing(wo)
 
     def _missing(self, w: Any) -> Any:
         turn = 0

@@ -93,9 +93,10 @@ class Light:
         value = value + scale * mixed + scale * scale * twice
         if known.more is None:
             return value
-        if dr.depth_v(scale) > dr.depth_v(wi.z):
-            return value + type(scale)([known.more(wi, wo, channel) for channel in scale])
-        return value + known.more(wi, wo, scale)
+        shade = scale / body_albedo(1, self.n)
+        if dr.depth_v(shade) > dr.depth_v(wi.z):
+            return value + type(shade)([known.more(wi, wo, channel) for channel in shade])
+        return value + known.more(wi, wo, shade)
 
     def _once(self, wi: Any, wo: Any) -> Any:
         if self.known.once is not None:

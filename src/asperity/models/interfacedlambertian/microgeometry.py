@@ -100,7 +100,7 @@ class ExplicitCavities:
             )
         first, *others = map(float, values)
         albedo: Any = (first, *others) if others else first
-        eta = _index(model, "int_ior") / _index(model, "ext_ior")
+        eta = max(_index(model, "int_ior") / _index(model, "ext_ior"), 1.0)  # 1 in air is meant to be no interface
         return cls(model["distribution"], alpha_u, alpha_v, albedo, eta)
 
     @property
