@@ -37,7 +37,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from ...lobes import Lobe
@@ -365,7 +364,7 @@ class More:
         UInt = dr.uint32_array_t(Float)
         shade = Float(np.linspace(0, 1, SHADES).astype(np.float32))
         upright = dr.replace_shape_t(Float, (3, -1))(0, 0, 1)
-        # Of even light a table too: it is an integral, and those in the loop over normals have no derivatives backwards.
+        # A table of even light too: integrals inside the loop over normals have no derivatives backwards.
         root = np.clip(np.linspace(0, 1, TILTS), 1e-3, 0.999)
         even = Table.of((TILTS,), even_light(Float((1 - root * root).astype(np.float32)), n))
 
