@@ -26,9 +26,9 @@ class Facets(Protocol):
     """
 
     level: ClassVar[float]
-    """How far the chance of a mirrored sample is moved to F of the surface, for grazing light on rough facets."""
+    """Least chance of a mirrored sample over F of the surface: level facets are seen from far down, or hidden."""
     horizon: ClassVar[float]
-    """Share of the body's samples that are even over the hemisphere then."""
+    """Share of the body's samples that are even over the hemisphere, for grazing light on rough facets."""
 
     def lit(self, facing_i: Any, facing_o: Any, cos_i: Any, cos_o: Any, cos_m: Any) -> Any:
         """<i.m> <o.m>, times what of G depends on the facet."""
@@ -47,7 +47,8 @@ class Facets(Protocol):
 class CavityFacets:
     """Facets m and (-m_x, -m_y, m_z) are a V-cavity (Torrance and Sparrow 1967; Eq. 15)."""
 
-    level, horizon = 0.7, 0.4
+    level: ClassVar = 0.63
+    horizon: ClassVar = 0.35
 
     def lit(self, facing_i: Any, facing_o: Any, cos_i: Any, cos_o: Any, cos_m: Any) -> Any:
         """<i.m> <o.m> G."""
@@ -70,7 +71,8 @@ class CavityFacets:
 class SmithFacets:
     """Facets know nothing of their neighbours: G = G1(i) G1(o), of all that face both (Eqs. 17 to 22)."""
 
-    level, horizon = 0.0, 0.2
+    level: ClassVar = 0.0
+    horizon: ClassVar = 0.2
 
     def lit(self, facing_i: Any, facing_o: Any, cos_i: Any, cos_o: Any, cos_m: Any) -> Any:
         """<i.m> <o.m>."""

@@ -44,14 +44,12 @@ def typical_normal(distribution: Distribution, w: Any) -> Any:
 def mirrored_share(distribution: Distribution, facets: Facets, n: Any, w: Any) -> Any:
     """Share of the light along ``w`` that facets mirror, roughly: F at a typical cosine.
 
-    From low down, and on rough facets, a part is met at grazing incidence, where F is many times as large. And what
-    level facets mirror then no neighbour shadows in a V-cavity: to keep its weight low, it gets more than its share.
+    From low down, and on rough facets, a part is met at grazing incidence, where F is many times as large. What level
+    facets mirror then is not shadowed in V-cavities, and weighs F over this share: which is part of F at least.
     """
     cos = dr.minimum(w.z + typical_slope(distribution, w), 1)
     share = dr.lerp(fresnel(cos, n), fresnel(cos / 4, n), (cos - w.z) / (2 * cos))
-    if not facets.level:
-        return share
-    return dr.lerp(share, fresnel(w.z, n), facets.level * grazing(distribution, w) ** 4)
+    return dr.maximum(share, facets.level * fresnel(w.z, n)) if facets.level else share
 
 
 def evenly(w: Any) -> Any:
