@@ -86,14 +86,25 @@ def test_traced_albedos(rgb, distribution, alpha):
     assert weight.mean() == pytest.approx(expected, abs=5 * error + 1e-3)
 
 
+def check_weights(given):
+    """At 87 degrees they are below 2, and their mean is no more than all light."""
+    mean, error, largest = helpers.albedo({**MODEL, **given, "ext_ior": 1.0, "diffuse_reflectance": 1.0}, 87)
+    assert mean < 1 + 5 * error + 1e-3 and largest < 2
+
+
 @KIND
 @pytest.mark.parametrize("alpha", [0.03, 0.3, 1.2])
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.5])
 def test_weights_at_87_degrees(rgb, distribution, masking, alpha, n):
-    """Bounded; of V-cavities, whose facets shine back towards grazing light, by more. And there is no more light."""
-    given = {"int_ior": n, "ext_ior": 1.0, "distribution": distribution, "masking": masking, "alpha": alpha}
-    mean, error, largest = helpers.albedo({**MODEL, **given, "diffuse_reflectance": 1.0}, 87)
-    assert mean < 1 + 5 * error + 1e-3 and largest < (2.5 if masking == "smith" else 7)
+    check_weights({"int_ior": n, "distribution": distribution, "masking": masking, "alpha": alpha})
+
+
+@pytest.mark.parametrize("distribution", ["beckmann", "gaussian"])
+@pytest.mark.parametrize("alpha", [0.3, 1.2])
+@pytest.mark.parametrize("scattering", ["double", "multiple"])
+def test_weights_of_several_bounces(rgb, distribution, alpha, scattering):
+    """Where those of one bounce are largest."""
+    check_weights({"int_ior": 1.5, "distribution": distribution, "alpha": alpha, "scattering": scattering})
 
 
 @pytest.mark.parametrize("masking", ["smith", "vcavity"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -25,6 +25,11 @@ class Facets(Protocol):
     Directions are above the horizon; ``facing`` is a dot product w.m.
     """
 
+    level: ClassVar[float]
+    """Least chance of a mirrored sample over F of the surface: level facets are seen from far down, or hidden."""
+    horizon: ClassVar[float]
+    """Share of the body's samples that are even over the hemisphere, for grazing light on rough facets."""
+
     def lit(self, facing_i: Any, facing_o: Any, cos_i: Any, cos_o: Any, cos_m: Any) -> Any:
         """<i.m> <o.m>, times what of G depends on the facet."""
 
@@ -41,6 +46,9 @@ class Facets(Protocol):
 @dataclass
 class CavityFacets:
     """Facets m and (-m_x, -m_y, m_z) are a V-cavity (Torrance and Sparrow 1967; Eq. 15)."""
+
+    level: ClassVar = 0.63
+    horizon: ClassVar = 0.35
 
     def lit(self, facing_i: Any, facing_o: Any, cos_i: Any, cos_o: Any, cos_m: Any) -> Any:
         """<i.m> <o.m> G."""
@@ -62,6 +70,9 @@ class CavityFacets:
 @dataclass
 class SmithFacets:
     """Facets know nothing of their neighbours: G = G1(i) G1(o), of all that face both (Eqs. 17 to 22)."""
+
+    level: ClassVar = 0.0
+    horizon: ClassVar = 0.2
 
     def lit(self, facing_i: Any, facing_o: Any, cos_i: Any, cos_o: Any, cos_m: Any) -> Any:
         """<i.m> <o.m>."""

@@ -171,8 +171,8 @@ class InterfacedLambertian(LobeModel):
         light = Light(distribution, facets, n, self.rule, self.known.result)
         interface: Lobe = Interface(distribution, facets, n)
         if self.scattering != "single":
-            interface = CavityMirrors(distribution, n, partial(mirrored_share, distribution, n))
-        return [Lifted(lobe, lift) for lobe in (interface, Body(distribution, n, scale, light))]
+            interface = CavityMirrors(distribution, n, partial(mirrored_share, distribution, facets, n))
+        return [Lifted(lobe, lift) for lobe in (interface, Body(distribution, facets, n, scale, light))]
 
     def _relative_index(self, inner: Any, outer: Any) -> Any:
         return clamp(inner / outer, 1, 10)
