@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
-from .numerics import SHORTEST, TINY, heading
+from .numerics import TINY, heading
 
 if TYPE_CHECKING:
     from .distributions import Distribution
@@ -118,7 +118,7 @@ def over_normals(
         for step in range(azimuths // 2 + odd):
             half = math.pi * (step + (1 - odd) / 2) / azimuths  # t / 2
             sine = square * math.sin(half) ** 2
-            cosine = dr.maximum(1 - sine, SHORTEST)
+            cosine = dr.maximum(1 - sine, TINY)
             inverse = dr.rsqrt(cosine)
             share = dr.sqrt(square) * inverse * math.cos(half) if half < math.pi / 2 else 1  # dchi / dt
             sin = 2 * dr.sqrt(square) * math.sin(half) * cosine * inverse
