@@ -1,8 +1,9 @@
 """Speed against Mitsuba's own `roughconductor` (GGX), in one process: `python benchmarks/speed.py [--quick]`.
 
-Ratios of the medians of interleaved runs; two noisy cores leave some 2 % of doubt. Two scenes: *bare* (a sphere on a
-plane, constant light and a point light: little tracing, so the BSDF is much of the frame) and *preview* (the default
-object of `asperity render` under an environment map: what a user feels).
+Ratios of the medians of interleaved runs; two noisy cores leave some 2 % of doubt. Three scenes: *bare* (a sphere on a
+plane, constant light and a point light: little tracing, so the BSDF is much of the frame), *preview* (the default
+object of `asperity render` under an environment map: what a user feels), and *filled* (the same, the floor of the same
+material, so that the BSDF is most of the frame).
 """
 
 from __future__ import annotations
@@ -84,10 +85,16 @@ def bare(material, size: int, spp: int) -> dict:
     }
 
 
+def filled(material, size: int, spp: int) -> dict:
+    scene = preview(material, size=(size, size), spp=spp, integrator={"type": "path", "max_depth": 6})
+    return scene | {"ground": scene["ground"] | {"bsdf": material}}
+
+
 def scenes(size: int, spp: int) -> dict:
     return {
         "bare": lambda material: bare(material, size, 4 * spp),
         "preview": lambda material: preview(material, size=(size, size), spp=spp),
+        "filled": lambda material: filled(material, size, spp),
     }
 
 

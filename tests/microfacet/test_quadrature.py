@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from helpers import directions
 
-from asperity.microfacet.distributions import DISTRIBUTIONS, GGX, Beckmann
+from asperity.microfacet.distributions import GGX, Beckmann, Gaussian, Phong
 from asperity.microfacet.masking import cavity_visible, cavity_visible_and_lit
-from asperity.microfacet.quadrature import RULES, accumulate, gauss_legendre, integrate, over_normals
+from asperity.microfacet.quadrature import RULES, accumulate, by_grazing, gauss_legendre, integrate, over_normals
 
 
 @dataclass
@@ -65,26 +65,27 @@ def test_rules_are_gausss(n):
 
 def seen(m, w):
     """Of a facet, over its share of the ground."""
-    return (dr.maximum(dr.dot(m, w), 0) / m.z,)
+    return (dr.maximum(dr.dot(m, w), 0),)
 
 
-@pytest.mark.parametrize("rings, azimuths, worst", [(8, 32, 2.5e-3), (16, 64, 6e-4)])
+@pytest.mark.parametrize("rings, azimuths, worst", [(8, 8, 1.5e-3), (16, 12, 2.5e-4), (32, 32, 4e-5)])
 @pytest.mark.parametrize("alphas", [(0.3, 0.3), (0.8, 0.1)], ids=str)
 @pytest.mark.parametrize("kind", [GGX, Beckmann])
 def test_normals_project_to_what_is_seen(kind, alphas, rings, azimuths, worst):
-    """(1 + Lambda) cos, by Smith's condition: as good as measured, less than the step^2 / 4 = .01 of a kink a ring."""
+    """(1 + Lambda) cos, by Smith's condition: as good as measured, but for a third."""
     w, distribution = llvm.Array3f64(directions(np.random.default_rng(1), 2000, lowest=0.05)), kind(*alphas)
     (total,) = over_normals(seen, distribution, w, w, rings, azimuths)
     error = np.array(total / ((1 + distribution.smith_lambda(w)) * w.z) - 1)
     assert np.abs(error).max() < worst
 
 
-@pytest.mark.parametrize("kind", DISTRIBUTIONS.values())
-def test_both_facets_of_a_cavity_are_nodes(kind):
-    """So what is seen of cavities is the cosine, whatever the number of nodes."""
-    w = llvm.Array3f64(directions(np.random.default_rng(2), 100))
-    (total,) = over_normals(lambda m, w: (cavity_visible(dr.dot(m, w), w.z, m.z) / m.z,), kind(0.3, 0.7), w, w, 4, 6)
-    np.testing.assert_allclose(total, w.z, rtol=1e-12)
+@pytest.mark.parametrize("alphas", [(0.3, 0.3), (0.8, 0.1)], ids=str)
+@pytest.mark.parametrize("kind", [GGX, Beckmann, Gaussian, Phong])
+def test_cavities_are_seen_by_their_openings(kind, alphas):
+    """Whose cosine is cos, so that all of a ring is found that faces w, for rings that are no ellipses too: to .05 %."""
+    w = llvm.Array3f64(directions(np.random.default_rng(2), 2000, lowest=0.05))
+    (total,) = over_normals(lambda m, w: (cavity_visible(dr.dot(m, w), w.z, 1),), kind(*alphas), w, w, 32, 32)
+    np.testing.assert_allclose(total, w.z, rtol=5e-4)
 
 
 def test_few_nodes_are_reciprocal_and_know_no_azimuth():
@@ -98,9 +99,10 @@ def test_few_nodes_are_reciprocal_and_know_no_azimuth():
 
         def term(m, pair):
             i, o = pair
-            return (cavity_visible_and_lit(dr.dot(i, m), dr.dot(o, m), i.z, o.z, m.z) / m.z,)
+            return (cavity_visible_and_lit(dr.dot(i, m), dr.dot(o, m), i.z, o.z, 1),)
 
-        return np.array(over_normals(term, GGX(0.5, 0.5), dr.select(i.z < o.z, i, o), (i, o), 4, 8)[0])
+        normals = GGX(0.5, 0.5)
+        return np.array(over_normals(term, normals, by_grazing(normals, i, o)[0], (i, o), 4, 8)[0])
 
     np.testing.assert_allclose(lit(o, i), lit(i, o), rtol=1e-11)
     np.testing.assert_allclose(lit(i, o, turn=1.0), lit(i, o), rtol=1e-11)

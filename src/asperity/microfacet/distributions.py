@@ -52,6 +52,18 @@ class Distribution:
         """
         return self.sample_tilt(alpha, u), 1
 
+    def least_slope(self, u: Any) -> Any:
+        """Least tan a / alpha_phi of the ring of `tilt_node`, roughly: that along x or y."""
+        (x, _), _ = self.slopes(1, 0, u)
+        (_, y), _ = self.slopes(0, 1, u)
+        return dr.minimum(x / self.alpha_u, y / self.alpha_v)
+
+    def slopes(self, cos_psi: Any, sin_psi: Any, u: Any) -> tuple[tuple[Any, Any], Any]:
+        """((m_x / m_z, m_y / m_z), weight) on the ring of `tilt_node`, at an azimuth of `stretched_azimuth`."""
+        cos_phi, sin_phi, alpha = self.stretched_azimuth(cos_psi, sin_psi)
+        (sin, cos), weight = self.tilt_node(alpha, u)
+        return (sin / cos * cos_phi, sin / cos * sin_phi), weight
+
     def smith_lambda(self, w: Any) -> Any:
         """Lambda(w) >= 0 of Smith's masking G1 = 1 / (1 + Lambda), for a direction above the horizon."""
         raise NotImplementedError
@@ -106,9 +118,10 @@ class GGX(Distribution):
         """Slopes are alpha sqrt(u / (1 - u))."""
         return normalised(alpha * dr.sqrt(u), dr.sqrt(1 - u))
 
-    def tilt_node(self, alpha: Any, u: Any) -> tuple[tuple[Any, Any], Any]:
-        """Twice as dense in steep normals, of which there are many."""
-        return self.sample_tilt(alpha, 1 - dr.square(1 - u)), 2 * (1 - u)
+    def slopes(self, cos_psi: Any, sin_psi: Any, u: Any) -> tuple[tuple[Any, Any], Any]:
+        """On an ellipse, as if 1 - u were its square: steep normals are many, and have twice as many nodes."""
+        r = dr.sqrt(u * (2 - u)) / (1 - u)
+        return (self.alpha_u * r * cos_psi, self.alpha_v * r * sin_psi), 2 * (1 - u)
 
     def density(self, m: Any) -> Any:
         """D(m), which needs no azimuth."""
@@ -133,6 +146,11 @@ class Beckmann(Distribution):
     def sample_tilt(alpha: Any, u: Any) -> tuple[Any, Any]:
         """Squares of slopes are exponential variates."""
         return normalised(alpha * dr.sqrt(-dr.log(1 - u)), 1)
+
+    def slopes(self, cos_psi: Any, sin_psi: Any, u: Any) -> tuple[tuple[Any, Any], Any]:
+        """On an ellipse, as if 1 - u were its power 3/2: the logarithm ends too fast for Gauss's rule."""
+        r = dr.sqrt(-1.5 * dr.log(1 - u))
+        return (self.alpha_u * r * cos_psi, self.alpha_v * r * sin_psi), 1.5 * dr.sqrt(1 - u)
 
     def smith_lambda(self, w: Any) -> Any:
         """(erf c - 1) / 2 + exp(-c^2) / (2 sqrt(pi) c) with 1 / c = alpha tan theta (Smith 1967; Walter et al. 2007).

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
-from .numerics import heading
+from .numerics import TINY, heading
 
 if TYPE_CHECKING:
     from .distributions import Distribution
 
-RULES = (4, 5, 6, 8, 12, 16)
+RULES = (4, 5, 6, 8, 12, 16, 20)
 """Numbers of nodes that models use in recorded loops: add yours, or `dr.freeze` does not find them."""
 
 
@@ -68,7 +68,20 @@ def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, 
     fast as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives
     need the copies.
     """
-    return _integrate(lambda node, _, captured: f(node, captured), n, captured, like, nested)
+    Float: Any = type(like)
+    nodes, weights = gauss_legendre(n)
+    if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(Float(nodes[0]), captured))):
+        copies = (f(node, captured) for node in nodes)
+        terms = [[weight * value for value in values] for values, weight in zip(copies, weights)]
+        return tuple(map(sum, zip(*terms)))
+    start = tuple(dr.zeros(type(value)) for value in f(Float(nodes[0]), captured))
+    nodes, weights = rule(n, Float)
+
+    def term(index: Any, captured: Any) -> tuple:
+        weight = dr.gather(Float, weights, index)
+        return tuple(weight * value for value in f(dr.gather(Float, nodes, index), captured))
+
+    return accumulate(term, dr.uint32_array_t(Float)(n), start, captured)
 
 
 def over_normals(
@@ -76,55 +89,66 @@ def over_normals(
     distribution: Distribution,
     towards: Any,
     captured: Any,
-    rings: int = 8,
-    azimuths: int = 32,
+    rings: int = 16,
+    azimuths: int = 16,
     nested: bool = False,
 ) -> tuple:
-    """Integrals of ``f(m, captured) D(m) m_z`` over all normals m above the horizon, for ``f`` that returns a tuple.
+    """Integrals of ``f(m, captured) D(m) m_z`` over all normals m, for ``f`` that returns a tuple, 0 if m.towards <= 0.
 
-    The normals of a ring have the same share of the facets, D m_z, within; they are evenly spaced where the stretched
-    distribution is isotropic, and so a kink of ``f`` along <w.m> = 0 is where all of them look alike. Every other ring
-    is turned by half a step. They come in pairs m, (-m_x, -m_y, m_z), the facets of a V-cavity. The first normal is
-    half a step from the azimuth of ``towards``: take the more grazing of two directions, and what is reciprocal, or
-    independent of the azimuth, stays so. ``azimuths`` are even; ``captured`` and ``nested`` are those of `integrate`.
+    What ``f`` gets is the normal over m_z, (x, y, 1): often that is all it needs.
+
+    The normals of a ring have the same share of the facets, D m_z, within; chi is the azimuth from ``towards`` where the
+    stretched distribution is isotropic. What of a ring faces that is the arc up to +-chi_0, all of it or less. Nodes are
+
+        sin(chi / 2) = sin(chi_0 / 2) sin(t / 2),    t evenly spaced, in every other ring half a step off:
+
+    even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the more grazing
+    of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Both numbers of
+    nodes are even; ``captured`` and ``nested`` are those of `integrate`.
     """
     vector: Any = type(towards)
-    start = heading(distribution.alpha_u * towards.x, distribution.alpha_v * towards.y)
 
-    def ring(u: Any, index: Any, everything: Any) -> tuple:
-        distribution, (x, y), captured = everything
-        odd, terms = index % 2 == 1, []
-        for step in range(azimuths // 2):
-            turns = (_turned(x, y, 2 * math.pi * (step + half) / azimuths) for half in (1, 0.5))
-            psi = (dr.select(odd, *either) for either in zip(*turns))
-            cos_phi, sin_phi, alpha = distribution.stretched_azimuth(*psi)
-            (sin, cos), weight = distribution.tilt_node(alpha, u)
-            m = vector(sin * cos_phi, sin * sin_phi, cos)
-            for normal in (m, vector(-m.x, -m.y, m.z)):
-                terms.append([weight / azimuths * value for value in f(normal, captured)])
+    def ring(odd: int, u: Any, everything: Any) -> tuple:
+        """The mean around it."""
+        distribution, towards, captured = everything
+        x, y = distribution.alpha_u * towards.x, distribution.alpha_v * towards.y
+        along, across = heading(x, y)
+        steepest = distribution.least_slope(u) * (x * along + y * across)
+        square, terms = (1 + dr.minimum(towards.z / dr.maximum(steepest, TINY), 1)) / 2, []  # sin^2(chi_0 / 2)
+        for step in range(azimuths // 2 + odd):
+            half = math.pi * (step + (1 - odd) / 2) / azimuths  # t / 2
+            sine = square * math.sin(half) ** 2
+            cosine = dr.maximum(1 - sine, TINY)
+            inverse = dr.rsqrt(cosine)
+            share = dr.sqrt(square) * inverse * math.cos(half) if half < math.pi / 2 else 1  # dchi / dt
+            sin = 2 * dr.sqrt(square) * math.sin(half) * cosine * inverse
+            for side in (sin, -sin) if 0 < half < math.pi / 2 else (sin,):
+                psi = along * (1 - 2 * sine) - across * side, across * (1 - 2 * sine) + along * side
+                (x, y), weight = distribution.slopes(*psi, u)
+                terms.append([share * (weight / azimuths) * value for value in f(vector(x, y, 1), captured)])
         return tuple(map(sum, zip(*terms)))
 
-    return _integrate(ring, rings, (distribution, start, captured), towards.z, nested)
+    nodes, weights = gauss_legendre(rings)
+    Float, everything = type(towards.z), (distribution, towards, captured)
+    if not dr.is_jit_v(Float) or (nested and dr.grad_enabled(ring(0, nodes[0], everything))):
+        found = [[w * value for value in ring(k % 2, u, everything)] for k, (u, w) in enumerate(zip(nodes, weights))]
+        return tuple(map(sum, zip(*found)))
+    nodes, weights = rule(rings, Float)
+
+    def both(index: Any, everything: Any) -> tuple:
+        """Two rings."""
+        found = []
+        for odd in (0, 1):
+            u, weight = (dr.gather(Float, values, 2 * index + odd) for values in (nodes, weights))
+            found.append([weight * value for value in ring(odd, u, everything)])
+        return tuple(map(sum, zip(*found)))
+
+    start = tuple(dr.zeros(type(value)) for value in f(towards, captured))
+    return accumulate(both, dr.uint32_array_t(Float)(rings // 2), start, everything)
 
 
-def _turned(x: Any, y: Any, angle: float) -> tuple[Any, Any]:
-    sin, cos = math.sin(angle), math.cos(angle)
-    return x * cos - y * sin, x * sin + y * cos
-
-
-def _integrate(f: Callable[[Any, Any, Any], tuple], n: int, captured: Any, like: Any, nested: bool) -> tuple:
-    """`integrate` for ``f(node, index, captured)``."""
-    Float: Any = type(like)
-    nodes, weights = gauss_legendre(n)
-    if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(Float(nodes[0]), 0, captured))):
-        copies = (f(node, index, captured) for index, node in enumerate(nodes))
-        terms = [[weight * value for value in values] for values, weight in zip(copies, weights)]
-        return tuple(map(sum, zip(*terms)))
-    start = tuple(dr.zeros(type(value)) for value in f(Float(nodes[0]), 0, captured))
-    nodes, weights = rule(n, Float)
-
-    def term(index: Any, captured: Any) -> tuple:
-        weight = dr.gather(Float, weights, index)
-        return tuple(weight * value for value in f(dr.gather(Float, nodes, index), index, captured))
-
-    return accumulate(term, dr.uint32_array_t(Float)(n), start, captured)
+def by_grazing(distribution: Distribution, i: Any, o: Any) -> tuple[Any, Any]:
+    """Two directions, first the one that faces fewer of the normals."""
+    tilt_i, tilt_o = (dr.square(distribution.alpha_u * w.x) + dr.square(distribution.alpha_v * w.y) for w in (i, o))
+    first = dr.square(i.z) * tilt_o < dr.square(o.z) * tilt_i
+    return dr.select(first, i, o), dr.select(first, o, i)

@@ -21,7 +21,7 @@ VALUES = {  # I at the pairs above, alpha = .5 (Gaussian: .35), n = 1 and 1.5: b
     (Gaussian, CavityFacets): ([0.88698, 1.20222, 0.61378, 0.88715], [0.81351, 1.04026, 0.44641, 0.67469]),
 }
 COMBINATIONS = pytest.mark.parametrize("kind, facets", VALUES, ids=lambda x: x.__name__)
-RULE = 12, 32
+RULE = 16, 12
 FLOATS = pytest.mark.parametrize("Float", [llvm.Float, llvm.Float64])
 
 
@@ -79,10 +79,10 @@ def test_light_that_bounces_inside(reflectance, n):
 
 @COMBINATIONS
 def test_published_values(kind, facets):
-    """To the five digits given, with many nodes; with those of the model to .2 %, being far from the horizon."""
+    """To the five digits given, with many nodes; with those of the model to .2 %."""
     alpha = 0.35 if kind is Gaussian else 0.5
     for n, expected in zip((1.0, 1.5), VALUES[kind, facets]):
-        for rule, tolerance in (((64, 256), 2e-4), (RULE, 2e-3)):
+        for rule, tolerance in (((64, 32), 2e-4), (RULE, 2e-3)):
             found = [body.body_integral(kind(alpha, alpha), facets(), n, *pair(*w), *rule)[0] for w in PAIRS]
             assert found == pytest.approx(expected, rel=tolerance)
 
@@ -106,17 +106,18 @@ def test_smooth_facets_are_one_facet(kind, facets, n):
 @COMBINATIONS
 @pytest.mark.parametrize("alphas", [(0.4, 0.4), (0.3, 0.8)], ids=str)
 def test_reciprocal_and_alike_under_its_symmetries(kind, facets, alphas):
+    """To rounding, and to the node opposite the more grazing direction, which is 1e-10 off it."""
     i, o = (llvm.Array3f64(directions(np.random.default_rng(k), 200)) for k in (3, 4))
     there, back = (body.body_integral(kind(*alphas), facets(), 1.5, *w, *RULE) for w in ((i, o), (o, i)))
-    np.testing.assert_allclose(there, back, rtol=1e-11)
+    np.testing.assert_allclose(there, back, rtol=1e-10)
     swapped = [llvm.Array3f64(w.y, w.x, w.z) for w in (i, o)]
     np.testing.assert_allclose(
-        body.body_integral(kind(*alphas[::-1]), facets(), 1.5, *swapped, *RULE), there, rtol=1e-11
+        body.body_integral(kind(*alphas[::-1]), facets(), 1.5, *swapped, *RULE), there, rtol=1e-10
     )
     if alphas[0] == alphas[1]:
         sin, cos = np.sin(0.7), np.cos(0.7)
         turned = [llvm.Array3f64(w.x * cos - w.y * sin, w.x * sin + w.y * cos, w.z) for w in (i, o)]
-        np.testing.assert_allclose(body.body_integral(kind(*alphas), facets(), 1.5, *turned, *RULE), there, rtol=1e-11)
+        np.testing.assert_allclose(body.body_integral(kind(*alphas), facets(), 1.5, *turned, *RULE), there, rtol=1e-10)
 
 
 def test_plain_floats_are_as_good():

@@ -27,17 +27,17 @@ from typing import Any
 import drjit as dr
 
 from ...microfacet.distributions import Distribution
-from ...microfacet.quadrature import over_normals
+from ...microfacet.quadrature import by_grazing, over_normals
 from .facets import Facets
 
 GRAZING = 1e-4
 """Least cosine: below, powers of it are beyond float32, and light has no share in anything."""
 
 
-def _refracted(cos: Any, n: Any) -> tuple[Any, Any]:
-    """(c, g): the cosine, kept off the horizon, and n times that inside, sqrt(n^2 - 1 + c^2)."""
+def _refracted(cos: Any, n: Any, square: Any = 1) -> tuple[Any, Any]:
+    """(c, g): the cosine, kept off the horizon, and n times that inside, sqrt(n^2 - 1 + c^2); both times a length."""
     c = dr.maximum(cos, GRAZING)
-    return c, dr.sqrt((n - 1) * (n + 1) + c * c)
+    return c, dr.sqrt((n - 1) * (n + 1) * square + c * c)
 
 
 def fresnel(cos: Any, n: Any) -> Any:
@@ -54,13 +54,13 @@ def transmitted(cos: Any, n: Any) -> Any:
     return 2 * c * g * (dr.square(dr.rcp(c + g)) + dr.square(n * dr.rcp(n * n * c + g)))
 
 
-def transmitted_twice(cos_i: Any, cos_o: Any, n: Any) -> Any:
-    """T(cos_i) T(cos_o), with one reciprocal."""
-    n2 = n * n
-    (c_i, g_i), (c_o, g_o) = _refracted(cos_i, n), _refracted(cos_o, n)
+def transmitted_twice(cos_i: Any, cos_o: Any, n: Any, length: Any = 1) -> Any:
+    """T(cos_i) T(cos_o) / length, of cosines that come times that ``length``; with one reciprocal."""
+    n2, square = n * n, length * length
+    (c_i, g_i), (c_o, g_o) = _refracted(cos_i, n, square), _refracted(cos_o, n, square)
     d_i, e_i, d_o, e_o = c_i + g_i, n2 * c_i + g_i, c_o + g_o, n2 * c_o + g_o
     sums = (dr.square(e_i) + n2 * dr.square(d_i)) * (dr.square(e_o) + n2 * dr.square(d_o))
-    return 4 * (c_i * g_i * c_o * g_o) * sums * dr.square(dr.rcp(d_i * e_i * d_o * e_o))
+    return 4 * (c_i * g_i * c_o * g_o) * sums * dr.square(dr.rcp(d_i * e_i * d_o * e_o * length)) * length
 
 
 def outer_reflectance(n: Any) -> Any:
@@ -89,22 +89,23 @@ def body_albedo(reflectance: Any, n: Any) -> Any:
 
 
 def body_integral(
-    distribution: Distribution, facets: Facets, n: Any, wi: Any, wo: Any, rings: int = 12, azimuths: int = 32
+    distribution: Distribution, facets: Facets, n: Any, wi: Any, wo: Any, rings: int = 16, azimuths: int = 12
 ) -> Any:
     """I(i, o) = int T(im) T(om) D G im om / (cos_i cos_o) dm (Eq. 13), which is 1 for flat facets of n = 1.
 
     Reciprocal to rounding, and independent of the azimuth where ``distribution`` is. ``wi`` and ``wo`` are above the
-    horizon by `GRAZING` at least. The error is that of the rule, most of it within 6 degrees of the horizon: with
-    12 x 32 nodes, .3 % at the 95th, .5 to .9 % at the 99th percentile of directions and parameters.
+    horizon by `GRAZING` at least. With 16 x 12 nodes the error is .2 % at the 95th, .4 % at the 99th percentile of all
+    directions and parameters, and 1 % at the 99.9th: both at grazing.
     """
 
     def term(m: Any, captured: tuple) -> tuple[Any]:
         n, wi, wo, facets = captured
-        facing_i, facing_o = dr.dot(wi, m), dr.dot(wo, m)
-        return (transmitted_twice(facing_i, facing_o, n) * facets.lit(facing_i, facing_o, wi.z, wo.z, m.z) / m.z,)
+        facing_i, facing_o = dr.dot(wi, m), dr.dot(wo, m)  # over m_z, of which there are two in what is lit
+        lit = facets.lit(facing_i, facing_o, wi.z, wo.z, 1)
+        return (transmitted_twice(facing_i, facing_o, n, dr.norm(m)) * lit,)
 
-    lower = dr.select(wi.z < wo.z, wi, wo)
-    (total,) = over_normals(term, distribution, lower, (n, wi, wo, facets), rings, azimuths)
+    towards, _ = by_grazing(distribution, wi, wo)
+    (total,) = over_normals(term, distribution, towards, (n, wi, wo, facets), rings, azimuths)
     return total * facets.masking(distribution, wi, wo) / (wi.z * wo.z)
 
 

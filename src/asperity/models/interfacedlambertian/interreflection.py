@@ -43,7 +43,7 @@ from ...lobes import Lobe
 from ...microfacet.distributions import Distribution
 from ...microfacet.masking import cavity_visible_and_lit
 from ...microfacet.numerics import clamp, heading
-from ...microfacet.quadrature import gauss_legendre, integrate, over_normals
+from ...microfacet.quadrature import gauss_legendre, integrate, by_grazing, over_normals
 from ...microfacet.sampling import reflect
 from ...microfacet.tables import Table
 from .body import GRAZING, body_albedo, fresnel, outer_reflectance, transmitted, transmitted_twice
@@ -162,12 +162,13 @@ def mirrored_part(i: Any, m: Any, lit: Met, seen: Met) -> tuple[Any, Any]:
 
 
 def two_bounces(
-    distribution: Distribution, n: Any, tau: EvenTransmittance, wi: Any, wo: Any, rings: int = 8, azimuths: int = 32
+    distribution: Distribution, n: Any, tau: EvenTransmittance, wi: Any, wo: Any, rings: int = 16, azimuths: int = 12
 ) -> tuple[Any, Any]:
     """(c_1, c_2), reciprocal: f of two bounces is Q c_1 + Q^2 c_2, and what is `mirrored_twice`."""
 
     def of_cavity(m: Any, captured: tuple) -> tuple:
         n, tau, wi, wo = captured
+        m = dr.normalize(m)
         other = opposite(m)
         lit, seen = Met.along(wi, m), Met.along(wo, other)
         both = transmitted_twice(lit.facing, seen.facing, n) * lit.share * seen.share
@@ -178,8 +179,8 @@ def two_bounces(
         body_mirror = fresnel(seen.facing, n) * transmitted_twice(cos, lit.facing, n) * part * lit.facing
         return (mirror_body + body_mirror) / (wi.z * wo.z), body_body
 
-    lower = dr.select(wi.z < wo.z, wi, wo)
-    once, twice = over_normals(of_cavity, distribution, lower, (n, tau, wi, wo), rings, azimuths)
+    wi, wo = by_grazing(distribution, wi, wo)
+    once, twice = over_normals(of_cavity, distribution, wi, (n, tau, wi, wo), rings, azimuths)
     return once * (2 / math.pi), twice * (2 / math.pi)
 
 
@@ -299,6 +300,7 @@ def mirrored_albedo(distribution: Distribution, n: Any, wi: Any) -> Any:
 
     def of_cavity(m: Any, captured: tuple) -> tuple:
         n, wi = captured
+        m = dr.normalize(m)
         lit, other = Met.along(wi, m), opposite(m)
         facing, wo = dr.maximum(lit.facing, TINY), reflect(wi, m)
         once = cavity_visible_and_lit(facing, facing, wi.z, wo.z, m.z) / (facing * m.z)
@@ -370,7 +372,7 @@ class More:
 
         def of_cavity(m: Any, captured: tuple) -> tuple:
             n, white, shade, even = captured
-            cos_m = dr.minimum(m.z, 1 - 1e-6)
+            cos_m = dr.minimum(dr.rcp(dr.norm(m)), 1 - 1e-6)
             return (more_bounces(cos_m, n, white * shade, *even.at(dr.sqrt(1 - cos_m))),)
 
         energy = over_normals(of_cavity, distribution, upright, (n, white, shade, even), 32, 8)[0]

@@ -38,7 +38,7 @@ MATCHED = 1e-3
 """Excess of the outer index that is taken for none: that of air over vacuum is less."""
 APART = 1.01
 """Ratio of the indices from which on derivatives by them are those of values nearby."""
-RULE, COARSE = (12, 32), (4, 8)
+RULE, COARSE = (16, 12), (4, 8)
 """Rings and azimuths of the integral over normals, and those of ``approximate``."""
 
 
