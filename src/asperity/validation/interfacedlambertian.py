@@ -235,14 +235,14 @@ def by_bounce(effort: Effort) -> Section:
             findings.append(Finding(f"{name}: `roughplastic` is refused", f"RMS {plastic.min():.2%}", limit, refused))
         last = f"{plastic[-1]:.1%}" if mitsubas else "-"
         rows.append((name, *(f"{x:.2%}" for x in (*double, *multiple)), last))
-        if surface == SURFACES[3]:
+        if surface == Surface("beckmann", 1.0):
             pictures["fig9"] = plane(f"{name}, K_d 1 (Fig. 9)", measured, model)
     shades = [f"`{name}`, K_d {albedo:g}" for name in SCATTERING[1:] for albedo in ALBEDOS]
     return Section(
         "One bounce, two, and all (Fig. 9), also of anisotropic facets (Fig. 14)",
         f"Index 1.5, K_d {', '.join(map(str, ALBEDOS))}; all cells but those that reach within {POLE:g}° of the mirror "
-        "direction. The table has errors: root mean squares over cells known to 3 %, less the noise of the tracing, and "
-        "a standard error more.",
+        "direction. The table has errors: root mean squares over cells known to 3 %, less noise of the tracing, and a "
+        "standard error more.",
         findings,
         [Table(("facets", *shades, "`roughplastic`, K_d 1"), rows)],
         pictures,
