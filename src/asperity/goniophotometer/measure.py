@@ -268,11 +268,16 @@ def _warn_of_repetition(piece: Piece, incident: np.ndarray) -> None:
             )
 
 
+def _kind(bsdf: Any) -> str:
+    """The name of a BSDF's class; a microgeometry's own facets need be none of Mitsuba's."""
+    return bsdf.class_name() if isinstance(bsdf, mi.BSDF) else type(bsdf).__name__
+
+
 def _check_facets(piece: Piece) -> None:
     """Light cannot be sent from mirrors to given directions."""
     for name, bsdf in piece.facets().items():
         if int(bsdf.flags()) & int(mi.BSDFFlags.Delta):
             raise ParameterError(
-                f"points: the facets of {name!r} are mirrors ({bsdf.class_name()}): no light leaves "
-                "them in exactly these directions. Use a hemisphere or a window."
+                f"points: the facets of {name!r} are mirrors ({_kind(bsdf)}): no light leaves them in "
+                "exactly these directions. Use a hemisphere or a window."
             )

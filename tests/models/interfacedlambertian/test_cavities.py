@@ -7,7 +7,7 @@ import pytest
 from helpers import gauss, towards
 
 from asperity.errors import ParameterError
-from asperity.goniophotometer import Hemisphere, measure
+from asperity.goniophotometer import Hemisphere, Points, measure
 from asperity.lab import evaluate
 from asperity.models.interfacedlambertian.microgeometry import ExplicitCavities, InterfacedLambertian
 
@@ -61,3 +61,9 @@ def test_a_facet_is_nonlinear_plastic(rgb, eta):
 def test_wrong_cavities_are_refused(wrong, complaint):
     with pytest.raises(ParameterError, match=complaint):
         ExplicitCavities(**wrong)
+
+
+def test_mirrors_cannot_be_aimed_at(rgb):
+    """They are in these facets, which are none of Mitsuba's BSDFs."""
+    with pytest.raises(ParameterError, match=r"'facets' are mirrors \(InterfacedLambertian\)"):
+        measure(ExplicitCavities(), [(30, 0)], sensor=Points(((30, 0),)), paths=1)

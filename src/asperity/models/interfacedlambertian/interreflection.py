@@ -43,7 +43,7 @@ from ...lobes import Lobe
 from ...microfacet.distributions import Distribution
 from ...microfacet.masking import cavity_visible_and_lit
 from ...microfacet.numerics import clamp, heading
-from ...microfacet.quadrature import gauss_legendre, integrate, by_grazing, over_normals
+from ...microfacet.quadrature import by_grazing, gauss_legendre, integrate, over_normals
 from ...microfacet.sampling import reflect
 from ...microfacet.tables import Table
 from .body import GRAZING, body_albedo, fresnel, outer_reflectance, transmitted, transmitted_twice
@@ -311,14 +311,7 @@ def mirrored_albedo(distribution: Distribution, n: Any, wi: Any) -> Any:
         leaves = dr.select(wo.z > 0, once, 0) + dr.select(last.z > 0, twice, 0)
         return (dr.select(lit.facing > 0, leaves * fresnel(facing, n), 0) / wi.z,)
 
-    # Few normals are mirrors in grazing light: rings of 32, turned by a quarter of a step each, are rings of 128.
-    Float, lanes = type(wi.z), dr.width(wi)
-    several = dr.gather(type(wi), wi, dr.repeat(dr.arange(dr.uint32_array_t(Float), lanes), 4))
-    x, y = heading(distribution.alpha_u * several.x, distribution.alpha_v * several.y)
-    sin, cos = dr.sincos(dr.tile(Float(0, 1, 2, 3), lanes) * (math.pi / 64))
-    start = (x * cos - y * sin) / distribution.alpha_u, (x * sin + y * cos) / distribution.alpha_v
-    towards = type(wi)(*start, several.z)
-    return dr.block_sum(over_normals(of_cavity, distribution, towards, (n, several), 32, 32)[0], 4) / 4
+    return over_normals(of_cavity, distribution, wi, (n, wi), 32, 16)[0]
 
 
 @dataclass
