@@ -1,10 +1,15 @@
-"""Variance times time of three ways to sample the specular grains: `python benchmarks/noise.py`.
+"""Variance times time of ways to sample a model: `python benchmarks/noise.py [--plastic]`.
 
-Relative variance of the mirror grains' albedo, times the seconds of a *preview* frame with that sampler at the same
-parameters. Numbers below 1 are better than sampling the NDF (Lucas 2024, Eq. 13 to 15).
+Relative variance of the albedo, times the seconds of a *preview* frame with that sampler at the same parameters. Of the
+mirror grains, against sampling the NDF (Lucas 2024, Eq. 13 to 15). With ``--plastic``, of interfaced facets, against
+the published scheme (Meneveaux et al. 2018, Sec. 4.1) and against Mitsuba's `roughplastic`, whose albedo is another.
+Products below 1 are better.
 """
 
 from __future__ import annotations
+
+import argparse
+import itertools
 
 import asperity  # noqa: F401  isort: skip
 import drjit as dr
@@ -26,11 +31,14 @@ SETS = {  # (tau_0, beta_x, beta_y): elevations in degrees; the table of the mod
     (0.90, 0.5, 0.5): (5, 45, 85),
 }
 SAMPLERS = {"NDF": "micrograin_ndf", "GGX visible": "micrograin_ggx", "exact": "micrograin"}
+PLASTICS = {"ours": "interfacedlambertian", "published": "interfacedlambertian_published"}
+MASKINGS = {"Smith": {}, "V-cavities": {"masking": "vcavity"}}
+ALPHAS, BODIES, VIEWS = (0.1, 0.3, 0.6, 1.0), (1.0, 0.5), (10, 60, 85)
 N = 1 << 21
 
 
-def relative_variance(material: dict, theta: float) -> float:
-    bsdf, rng = mi.load_dict(material), mi.PCG32(size=N)
+def relative_variance(bsdf: mi.BSDF, theta: float) -> float:
+    rng = mi.PCG32(size=N)
     theta = np.radians(theta)
     si = dr.zeros(mi.SurfaceInteraction3f, N)
     si.wi = mi.Vector3f(float(np.sin(theta) * np.cos(0.3)), float(np.sin(theta) * np.sin(0.3)), float(np.cos(theta)))
@@ -41,22 +49,25 @@ def relative_variance(material: dict, theta: float) -> float:
     return weight.var() / weight.mean() ** 2
 
 
-def main() -> None:
-    mi.set_variant("llvm_ad_rgb")
-    mi.set_log_level(mi.LogLevel.Error)
-    register()
+def frame_seconds(materials: dict) -> dict:
+    """Of a *preview* frame with each material."""
+    scenes = {
+        name: mi.load_dict(preview(material, size=(192, 192), spp=36), parallel=False)
+        for name, material in materials.items()
+    }
+    return medians({name: lambda scene=scene: finish(mi.render(scene)) for name, scene in scenes.items()}, 7)
+
+
+def grains() -> Table:
     table = Table(
         "tau_0, beta_x, beta_y", "degrees", *(f"{name}: variance" for name in SAMPLERS), "GGX x time", "exact x time"
     )
     for (tau_0, beta_x, beta_y), elevations in SETS.items():
-        grains = {"tau_0": tau_0, "beta_x": beta_x, "beta_y": beta_y}
-        scenes = {
-            name: mi.load_dict(preview({"type": plugin, **grains}, size=(192, 192), spp=36), parallel=False)
-            for name, plugin in SAMPLERS.items()
-        }
-        seconds = medians({name: lambda scene=scene: finish(mi.render(scene)) for name, scene in scenes.items()}, 7)
+        given = {"tau_0": tau_0, "beta_x": beta_x, "beta_y": beta_y}
+        materials = {name: {"type": plugin, **given} for name, plugin in SAMPLERS.items()}
+        seconds, bsdfs = frame_seconds(materials), {name: mi.load_dict(one) for name, one in materials.items()}
         for theta in elevations:
-            variance = {name: relative_variance({"type": plugin, **grains}, theta) for name, plugin in SAMPLERS.items()}
+            variance = {name: relative_variance(bsdf, theta) for name, bsdf in bsdfs.items()}
             product = {name: variance[name] * seconds[name] for name in SAMPLERS}
             table.add_row(
                 f"{tau_0}, {beta_x}, {beta_y}",
@@ -64,7 +75,41 @@ def main() -> None:
                 *(f"{v:.3g}" for v in variance.values()),
                 *(f"{product[name] / product['NDF']:.3g}" for name in ("GGX visible", "exact")),
             )
-    Console(width=130).print(table)
+    return table
+
+
+def plastic() -> Table:
+    columns = [f"{masking}, {name}" for masking in MASKINGS for name in PLASTICS] + ["roughplastic"]
+    products = [f"{masking} x time, over {of}" for masking in MASKINGS for of in ("published", "roughplastic")]
+    table, frames = Table("alpha", "body", "degrees", *(f"{name}: deviation" for name in columns), *products), []
+    for alpha, body in itertools.product(ALPHAS, BODIES):
+        given = {"alpha": alpha, "diffuse_reflectance": body}
+        kinds = [{"type": plugin, **masking} for masking in MASKINGS.values() for plugin in PLASTICS.values()]
+        materials = {name: {**kind, **given} for name, kind in zip(columns, [*kinds, {"type": "roughplastic"}])}
+        seconds, bsdfs = frame_seconds(materials), {name: mi.load_dict(one) for name, one in materials.items()}
+        frames.append([seconds[name] / seconds["roughplastic"] for name in columns])
+        for theta in VIEWS:
+            variance = {name: relative_variance(bsdf, theta) for name, bsdf in bsdfs.items()}
+            product = {name: variance[name] * seconds[name] for name in columns}
+            ratios = [
+                product[f"{masking}, ours"] / product[other]
+                for masking in MASKINGS
+                for other in (f"{masking}, published", "roughplastic")
+            ]
+            numbers = *(v**0.5 for v in variance.values()), *ratios
+            table.add_row(str(alpha), str(body), str(theta), *(f"{number:.2g}" for number in numbers))
+    times = zip(columns, np.median(frames, axis=0))
+    table.caption = "Frame over roughplastic's: " + ", ".join(f"{name} {time:.2f}" for name, time in times)
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--plastic", action="store_true", help="interfaced ones, against `roughplastic`")
+    mi.set_variant("llvm_ad_rgb")
+    mi.set_log_level(mi.LogLevel.Error)
+    register()
+    Console(width=130).print(plastic() if parser.parse_args().plastic else grains())
 
 
 if __name__ == "__main__":

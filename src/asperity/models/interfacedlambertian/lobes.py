@@ -67,8 +67,12 @@ class Interface(Lobe):
     n: Any
 
     def share(self, wi: Any) -> Any:
-        """F at typical facets."""
-        return mirrored_share(self.distribution, self.facets, self.n, wi)
+        """F at typical facets; less if the lobe is no higher than the body's, whose samples do then.
+
+        By mirroring, the density is about 1 / (4 pi alpha^2 cos_i) at its highest, by cosine cos_i / pi there.
+        """
+        lower = 4 * self.distribution.alpha_u * self.distribution.alpha_v * dr.square(wi.z)
+        return mirrored_share(self.distribution, self.facets, self.n, wi) / (1 + dr.square(lower))
 
     def eval_pdf(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """F D G / (4 cos_i), and the density of visible normals over 4 i.m."""
