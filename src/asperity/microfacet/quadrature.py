@@ -97,13 +97,13 @@ def over_normals(
 
     What ``f`` gets is the normal over m_z, (x, y, 1): often that is all it needs.
 
-    The normals of a ring have the same share of the facets, D m_z, within; chi is the azimuth from ``towards`` where the
-    stretched distribution is isotropic. What of a ring faces that is the arc up to +-chi_0, all of it or less. Nodes are
+    The normals of a ring have the same share of the facets, D m_z, within; chi is the azimuth from ``towards`` where
+    the stretched distribution is isotropic. What of a ring faces that is the arc up to +-chi_0, all of it or less:
 
         sin(chi / 2) = sin(chi_0 / 2) sin(t / 2),    t evenly spaced, in every other ring half a step off:
 
-    even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the more grazing
-    of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Both numbers of
+    nodes are even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the
+    more grazing of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Numbers of
     nodes are even; ``captured`` and ``nested`` are those of `integrate`.
     """
     vector: Any = type(towards)

@@ -44,7 +44,7 @@ from ...lobes import Lobe
 from ...microfacet.distributions import Distribution
 from ...microfacet.masking import cavity_visible_and_lit
 from ...microfacet.numerics import clamp, heading
-from ...microfacet.quadrature import gauss_legendre, integrate, by_grazing, over_normals
+from ...microfacet.quadrature import by_grazing, gauss_legendre, integrate, over_normals
 from ...microfacet.sampling import reflect
 from ...microfacet.tables import Table
 from .body import GRAZING, body_albedo, fresnel, outer_reflectance, transmitted, transmitted_twice
