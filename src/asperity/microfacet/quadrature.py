@@ -103,8 +103,8 @@ def over_normals(
         sin(chi / 2) = sin(chi_0 / 2) sin(t / 2),    t evenly spaced, in every other ring half a step off:
 
     nodes are even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the
-    more grazing of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Numbers of
-    nodes are even; ``captured`` and ``nested`` are those of `integrate`.
+    more grazing of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Both
+    numbers of nodes are even; ``captured`` and ``nested`` are those of `integrate`.
     """
     vector: Any = type(towards)
 
@@ -129,7 +129,8 @@ def over_normals(
         return tuple(map(sum, zip(*terms)))
 
     nodes, weights = gauss_legendre(rings)
-    Float, everything = type(towards.z), (distribution, towards, captured)
+    Float: Any = type(towards.z)
+    everything = (distribution, towards, captured)
     if not dr.is_jit_v(Float) or (nested and dr.grad_enabled(ring(0, nodes[0], everything))):
         found = [[w * value for value in ring(k % 2, u, everything)] for k, (u, w) in enumerate(zip(nodes, weights))]
         return tuple(map(sum, zip(*found)))

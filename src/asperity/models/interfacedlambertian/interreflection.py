@@ -311,7 +311,7 @@ def mirrored_albedo(distribution: Distribution, n: Any, wi: Any) -> Any:
         leaves = dr.select(wo.z > 0, once, 0) + dr.select(last.z > 0, twice, 0)
         return (dr.select(lit.facing > 0, leaves * fresnel(facing, n), 0) / wi.z,)
 
-    return over_normals(of_cavity, distribution, wi, (n, wi), 32, 32)[0]
+    return over_normals(of_cavity, distribution, wi, (n, wi), 32, 16)[0]
 
 
 @dataclass
@@ -370,7 +370,7 @@ class More:
             n, white, shade = captured
             return (more_bounces(dr.minimum(dr.rcp(dr.norm(m)), 1 - 1e-6), n, white * shade),)
 
-        energy = over_normals(of_cavity, distribution, upright, (n, white, shade), 32, 8)[0]
+        energy = over_normals(of_cavity, distribution, upright, (n, white, shade), 32, 4)[0]
         whole = dr.gather(Float, energy, UInt(SHADES - 1))
         return Table.of((SHADES,), [energy / dr.maximum(whole, TINY)])
 
