@@ -16,7 +16,7 @@ from .numerics import TINY, heading
 if TYPE_CHECKING:
     from .distributions import Distribution
 
-RULES = (4, 5, 6, 8, 12, 16, 20)
+RULES = (4, 5, 6, 8, 12, 16)
 """Numbers of nodes that models use in recorded loops: add yours, or `dr.freeze` does not find them."""
 
 
