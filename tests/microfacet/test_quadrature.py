@@ -82,7 +82,7 @@ def test_normals_project_to_what_is_seen(kind, alphas, rings, azimuths, worst):
 @pytest.mark.parametrize("alphas", [(0.3, 0.3), (0.8, 0.1)], ids=str)
 @pytest.mark.parametrize("kind", [GGX, Beckmann, Gaussian, Phong])
 def test_cavities_are_seen_by_their_openings(kind, alphas):
-    """Whose cosine is cos, so that all of a ring is found that faces w, for rings that are no ellipses too: to .05 %."""
+    """Whose cosine is cos: all of a ring is found that faces w, of rings that are no ellipses too; to .05 %."""
     w = llvm.Array3f64(directions(np.random.default_rng(2), 2000, lowest=0.05))
     (total,) = over_normals(lambda m, w: (cavity_visible(dr.dot(m, w), w.z, 1),), kind(*alphas), w, w, 32, 32)
     np.testing.assert_allclose(total, w.z, rtol=5e-4)

@@ -59,6 +59,17 @@ def test_nodes_and_what_is_linear_between_them_are_exact(any_variant, shape):
         np.testing.assert_allclose(values, exact(at), atol=4 * 2**axes * max(shape) * EPSILON)
 
 
+@pytest.mark.parametrize("levels", [1, 3])
+def test_triangles_have_a_kink_on_the_diagonal(any_variant, levels):
+    """|x - y| + l x, which four nodes of a cell would round off."""
+    Float, _ = array_types("a test")
+    level, x, y = np.meshgrid(np.linspace(0, 1, levels), *[np.linspace(0, 1, 5)] * 2, indexing="ij")
+    made = table((np.abs(x - y) + level * x)[None], Float).native()
+    for at in ((0.0, 0.3, 0.3), (0.5, 0.3, 0.45), (0.8, 0.95, 0.1), (1.0, 1.0, 1.0)):
+        value = np.asarray(made.at(*(mi.Float(one) for one in at), triangles=True)[0]).item()
+        assert value == pytest.approx(abs(at[1] - at[2]) + (at[0] * at[1] if levels > 1 else 0), abs=1e-6)
+
+
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
 def test_the_values_of_nodes_are_returned_bit_by_bit(rgb, shape):
     """Where the coordinate of a node is a float: at the corners, for as wild values as there are."""

@@ -16,7 +16,7 @@ from .numerics import TINY, heading
 if TYPE_CHECKING:
     from .distributions import Distribution
 
-RULES = (4, 5, 6, 8, 12, 16, 20)
+RULES = (4, 5, 6, 8, 12, 16)
 """Numbers of nodes that models use in recorded loops: add yours, or `dr.freeze` does not find them."""
 
 
@@ -97,14 +97,14 @@ def over_normals(
 
     What ``f`` gets is the normal over m_z, (x, y, 1): often that is all it needs.
 
-    The normals of a ring have the same share of the facets, D m_z, within; chi is the azimuth from ``towards`` where the
-    stretched distribution is isotropic. What of a ring faces that is the arc up to +-chi_0, all of it or less. Nodes are
+    The normals of a ring have the same share of the facets, D m_z, within; chi is the azimuth from ``towards`` where
+    the stretched distribution is isotropic. What of a ring faces that is the arc up to +-chi_0, all of it or less:
 
         sin(chi / 2) = sin(chi_0 / 2) sin(t / 2),    t evenly spaced, in every other ring half a step off:
 
-    even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the more grazing
-    of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Both numbers of
-    nodes are even; ``captured`` and ``nested`` are those of `integrate`.
+    nodes are even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the
+    more grazing of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Both
+    numbers of nodes are even; ``captured`` and ``nested`` are those of `integrate`.
     """
     vector: Any = type(towards)
 
@@ -129,7 +129,8 @@ def over_normals(
         return tuple(map(sum, zip(*terms)))
 
     nodes, weights = gauss_legendre(rings)
-    Float, everything = type(towards.z), (distribution, towards, captured)
+    Float: Any = type(towards.z)
+    everything = (distribution, towards, captured)
     if not dr.is_jit_v(Float) or (nested and dr.grad_enabled(ring(0, nodes[0], everything))):
         found = [[w * value for value in ring(k % 2, u, everything)] for k, (u, w) in enumerate(zip(nodes, weights))]
         return tuple(map(sum, zip(*found)))

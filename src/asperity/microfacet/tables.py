@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from math import prod
 from typing import Any
 
@@ -49,8 +48,12 @@ class Table:
         """The table for the active variant, in a scalar one of plain floats."""
         return self if dr.is_jit_v(mi.Float) else replace(self, entries=self.entries.numpy().tolist())
 
-    def at(self, *x: Any) -> list[Any]:
-        """All channels at the coordinates ``x``, one for each axis; beyond [0, 1] the value at the end."""
+    def at(self, *x: Any, triangles: bool = False) -> list[Any]:
+        """All channels at the coordinates ``x``, one for each axis; beyond [0, 1] the value at the end.
+
+        ``triangles``: cells of the last two axes, of as many nodes, are two triangles on either side of the diagonal,
+        where functions that know no order of the two may have a kink; a node less is read.
+        """
         if len(x) != len(self.shape):
             raise ParameterError(f"table: {len(x)} coordinates, for {len(self.shape)} axes.")
         first, stride, sides = 0, prod(self.shape), []
@@ -59,12 +62,21 @@ class Table:
             if nodes > 1:
                 node, beyond = _cell(coordinate, nodes)
                 first = first + node * stride
-                sides.append(((0, 1 - beyond), (stride, beyond)))
+                sides.append((stride, beyond))
+        corners: list[tuple[Any, Any]] = [(first, 1)]
+        if triangles:
+            (next_x, x_beyond), (next_y, y_beyond) = sides.pop(-2), sides.pop()
+            low, high = dr.minimum(x_beyond, y_beyond), dr.maximum(x_beyond, y_beyond)
+            between = first + dr.select(x_beyond > y_beyond, next_x, next_y)
+            corners = [(first, 1 - high), (between, high - low), (first + next_x + next_y, low)]
+        for stride, beyond in sides:
+            corners = [
+                (node + offset, weight * share)
+                for node, weight in corners
+                for offset, share in ((0, 1 - beyond), (stride, beyond))
+            ]
         sums: list[Any] = [0] * self.channels
-        for corner in product(*sides):
-            node, weight = first, 1
-            for offset, share in corner:
-                node, weight = node + offset, weight * share
+        for node, weight in corners:
             sums = [total + weight * value for total, value in zip(sums, self._values(node))]
         return sums
 

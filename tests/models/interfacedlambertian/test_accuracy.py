@@ -1,6 +1,12 @@
-"""How far what the model looks up, or sums with few nodes, is from the integral over facets with many."""
+"""How far what the model looks up, or sums with few nodes, is from the integral over facets with many.
+
+As a script it prints the table of docs/interfacedlambertian.md, of 100 000 inputs a row: in a quarter of an hour.
+"""
 
 import asperity  # noqa: F401  isort: skip
+import itertools
+
+import drjit as dr
 import helpers
 import mitsuba as mi
 import numpy as np
@@ -9,10 +15,13 @@ import pytest
 from asperity.lab import evaluate
 from asperity.models.interfacedlambertian import body
 from asperity.models.interfacedlambertian.facets import DISTRIBUTIONS, FACETS
+from asperity.models.interfacedlambertian.interreflection import two_bounces
+from asperity.models.interfacedlambertian.light import Known
 
 KINDS = [("beckmann", "smith"), ("ggx", "smith"), ("beckmann", "vcavity"), ("ggx", "vcavity"), ("gaussian", "vcavity")]
-MANY = 64, 128
+MANY = 48, 32
 """Rings and azimuths of the reference, whose own error is a tenth of what is asked for."""
+VARIED = {"": "table", "textured": "textured", "anisotropic": "sum"}
 
 
 def pairs(rng, n):
@@ -42,31 +51,73 @@ def errors(rng, kind, n, varied):
     si, wo = evaluate.interaction((both := pairs(rng, n))[0]), both[1]
     si.uv = mi.Point2f(*rng.random((2, n)))
     found = bsdf.eval(mi.BSDFContext(mi.TransportMode.Radiance, 0xFFFFFFFF, 1), si, wo).x
-    normals = DISTRIBUTIONS[distribution](*bsdf.model.at("alpha", si, True))
-    exact = body.body_integral(normals, FACETS[masking](), mi.Float(index), si.wi, wo, *MANY)
-    exact = np.array(exact * body.body_albedo(1.0, mi.Float(index)) * wo.z / np.pi)
+    alphas, index = bsdf.model.at("alpha", si, True), mi.Float(index)
+    dr.make_opaque(alphas, index)  # one kernel for all
+    exact = body.body_integral(DISTRIBUTIONS[distribution](*alphas), FACETS[masking](), index, si.wi, wo, *MANY)
+    exact = np.array(exact * body.body_albedo(1.0, index) * wo.z / np.pi)
     return (np.abs(np.array(found) / exact - 1))[exact > 1e-3]
 
 
 def percentiles(kind, varied, materials, n, seed=0):
+    """95th, 99th and 99.9th, of ``n`` pairs of directions on each material."""
     rng = np.random.default_rng(seed)
     return np.percentile(np.concatenate([errors(rng, kind, n, varied) for _ in range(materials)]), [95, 99, 99.9])
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=["-".join(kind) for kind in KINDS])
-@pytest.mark.parametrize("varied", ["", "textured", "anisotropic"], ids=["table", "textured", "sum"])
+@pytest.mark.parametrize("varied", VARIED, ids=VARIED.values())
 @pytest.mark.parametrize("materials, n", [pytest.param(12, 800, marks=pytest.mark.slow), (2, 800)], ids=["all", "some"])
 def test_close_to_the_integral(rgb, kind, varied, materials, n):
-    """What is asked for: .5 % at the 95th percentile, 1.5 % at the 99th; of Smith's, with no kinks but at the horizon,
-    1 % at the 99.9th. Tables of many roughnesses have fewer terms, and are made with fewer nodes: 2 % each."""
+    """What is asked for: .5 % at the 95th percentile, 1.5 % at the 99th, and of Smith's, which has no kinks but where
+    facets turn away, 1 % at the 99.9th."""
     middle, high, highest = percentiles(kind, varied, materials, n)
-    assert middle < 0.005 and high < (0.02 if varied == "textured" else 0.015)
+    assert middle < 0.005 and high < 0.015
     if kind[1] == "smith":
-        assert highest < (0.02 if varied == "textured" else 0.012)
+        assert highest < 0.01
+
+
+@pytest.mark.parametrize("kind", KINDS[2:], ids=lambda kind: kind[0])
+def test_cavities_on_the_horizon(rgb, kind):
+    """Towards its source they return light as 1 / cos: to a fifth, from .003 on, between nodes at 0 and .008."""
+    cos, index, alpha = np.geomspace(3e-3, 0.03, 40), mi.Float(1.5), mi.Float(0.9)
+    w = mi.Vector3f(np.sqrt(1 - cos**2), 0 * cos, cos)
+    normals, facets = DISTRIBUTIONS[kind[0]](alpha, alpha), FACETS[kind[1]]()
+    found = Known.made(type(normals), facets, "single", True, MANY, index, alpha).once.at(alpha, w, w)
+    np.testing.assert_allclose(found, body.body_integral(normals, facets, index, w, w, *MANY), rtol=0.2)
+
+
+def two_bounces_of(rng, distribution, n):
+    """What tables of two bounces are off, over all light, and where that exceeds 1e-3."""
+    alpha, index = np.exp(rng.uniform(*np.log([0.01, 1.2]))), rng.choice([1, rng.uniform(1, 2.5)], p=[0.1, 0.9])
+    given = {"type": "interfacedlambertian", "distribution": distribution, "alpha": alpha, "int_ior": index}
+    model = mi.load_dict({**given, "ext_ior": 1.0, "diffuse_reflectance": 1.0, "scattering": "double"}).model
+    known, alpha, index, (wi, wo) = model.known.result, mi.Float(alpha), mi.Float(index), pairs(rng, n)
+    dr.make_opaque(alpha, index)
+    normals = DISTRIBUTIONS[distribution](alpha, alpha)
+    scale, looked_up = (
+        body.body_albedo(1.0, index),
+        (table.at(mi.Float(alpha), wi, wo) for table in (known.mixed, known.twice)),
+    )
+    once, twice = two_bounces(normals, index, known.tau, wi, wo, *MANY)
+    found, exact = (np.array(scale * (c_1 + scale * c_2) * wo.z) for c_1, c_2 in (looked_up, (once, twice)))
+    facets = FACETS["vcavity"]()
+    first = body.body_integral(normals, facets, index, wi, wo, *MANY) * scale * wo.z / np.pi
+    whole = np.array(first + body.interface(normals, facets, index, wi, wo)) + exact
+    return (np.abs(found - exact) / whole)[whole > 1e-3]
+
+
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+@pytest.mark.parametrize("materials", [pytest.param(12, marks=pytest.mark.slow), 2], ids=["all", "some"])
+def test_two_bounces(rgb, distribution, materials):
+    """A third of what `double` may be off from traced cavities: 1 % at the 95th percentile, 2 % at the 99th."""
+    rng = np.random.default_rng(1)
+    found = np.concatenate([two_bounces_of(rng, distribution, 800) for _ in range(materials)])
+    middle, high = np.percentile(found, [95, 99])
+    assert middle < 0.0033 and high < 0.0067
 
 
 def test_the_coarse_rule(rgb):
-    """Of `approximate`: 3 % at the 95th percentile where neither direction grazes."""
+    """Of `approximate`: 1 % at the 95th percentile where neither direction grazes."""
     errors = []
     for kind in KINDS:
         given = {"type": "interfacedlambertian", "distribution": kind[0], "masking": kind[1], "alpha": 0.4}
@@ -76,4 +127,19 @@ def test_the_coarse_rule(rgb):
             for more in ({"approximate": True}, {})
         )
         errors.append(coarse / fine - 1)
-    assert 0.001 < np.percentile(np.abs(errors), 95) < 0.03
+    assert 0.001 < np.percentile(np.abs(errors), 95) < 0.01
+
+
+def main():
+    mi.set_variant("llvm_ad_rgb")
+    print("% at the percentile:  95th   99th   99.9th")
+    for kind, varied in itertools.product(KINDS, VARIED):
+        print(*kind, VARIED[varied], *np.round(100 * percentiles(kind, varied, 50, 2000, seed=2), 2), flush=True)
+    for distribution in DISTRIBUTIONS:
+        rng = np.random.default_rng(2)
+        found = np.concatenate([two_bounces_of(rng, distribution, 2000) for _ in range(50)])
+        print(distribution, "two bounces", *np.round(100 * np.percentile(found, [95, 99, 99.9]), 2), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -375,7 +375,7 @@ class More:
             cos_m = dr.minimum(dr.rcp(dr.norm(m)), 1 - 1e-6)
             return (more_bounces(cos_m, n, white * shade, *even.at(dr.sqrt(1 - cos_m))),)
 
-        energy = over_normals(of_cavity, distribution, upright, (n, white, shade, even), 32, 8)[0]
+        energy = over_normals(of_cavity, distribution, upright, (n, white, shade, even), 32, 4)[0]
         whole = dr.gather(Float, energy, UInt(SHADES - 1))
         return Table.of((SHADES,), [energy / dr.maximum(whole, TINY)])
 

@@ -69,7 +69,7 @@ class InterfacedLambertian(LobeModel):
         "how often light meets facets at most: once, twice, or as often as it takes, in V-cavities",
         options=("single", "double", "multiple"),
     )
-    approximate = Flag("whether a coarse rule sums over the facets, with errors of 3 %, instead of a table", False)
+    approximate = Flag("whether a coarse rule sums over the facets, with errors of 1 %, instead of a table", False)
 
     def configure(self, given: set[str]) -> None:
         """Settle the masking, and complain of what does not go together."""

@@ -6,7 +6,8 @@ direction evenly in
 
     x = log(1 + v / k) / log(1 + 1 / k),    v = 1 - tan(theta / 2),    k of the size of the roughness,
 
-which are dense towards the horizon, where light varies over angles as large as the facets' tilts.
+which are dense towards the horizon, where light varies over angles as large as the facets' tilts. What of a table grows
+as 1 / cos there is 1 + horizon alpha / (cos_i + cos_o) times what is stored.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ class Build(NamedTuple):
     azimuths: int  # at which it is fitted
     rule: tuple[int, int]  # of sums over normals: rings and azimuths
     near: float  # k over the roughness
+    horizon: float = 0
 
 
 @dataclass
@@ -49,7 +51,7 @@ class PairTable:
     table: Table  # coefficients over the logarithm of the roughness and the x of either direction
     low: float  # least roughness, and the logarithm of the largest over it
     extent: float
-    near: float
+    build: Build
     rooted: bool  # whether the polynomial is the root
 
     def native(self) -> PairTable:
@@ -63,16 +65,21 @@ class PairTable:
         (sin_i, cos_i), (sin_o, cos_o) = inclination(wi), inclination(wo)
         cos_phi = (wi.x * wo.x + wi.y * wo.y) / dr.maximum(sin_i * sin_o, 1e-8)
         t = dr.minimum(2 * dr.sqrt(dr.maximum((1 + cos_phi) / 2, 1e-12)) - 1, 1)
-        k = nearness(self.near, alpha)
+        k = nearness(self.build.near, alpha)
         most = dr.rcp(dr.log(1 + dr.rcp(k)))
         x_i, x_o = (dr.log(1 + (1 - sin / (1 + cos)) / k) * most for sin, cos in ((sin_i, cos_i), (sin_o, cos_o)))
-        value = chebyshev(self.table.at(dr.log(alpha / self.low) / self.extent, x_i, x_o), t)
-        return dr.square(value) if self.rooted else dr.maximum(value, 0)
+        value = chebyshev(self.table.at(dr.log(alpha / self.low) / self.extent, x_i, x_o, triangles=True), t)
+        return growth(self.build, alpha, wi, wo) * (dr.square(value) if self.rooted else dr.maximum(value, 0))
 
 
 def nearness(near: float, alpha: Any) -> Any:
     """k, but for facets so smooth that nodes for them would be missed elsewhere."""
     return dr.maximum(near * alpha, SMOOTHEST)
+
+
+def growth(build: Build, alpha: Any, wi: Any, wo: Any) -> Any:
+    """How fast values grow towards the horizon."""
+    return 1 + build.horizon * alpha / (wi.z + wo.z) if build.horizon else 1
 
 
 def steps(low: float, high: float) -> tuple[float, float]:
@@ -104,12 +111,14 @@ def tabulate(
         levels = min(LEVELS, 1 + math.ceil(extent / math.log(RATIO) - 1e-6))
         alpha = Float((low * np.exp(np.linspace(0, extent, levels))).astype(np.float32))
     shape = dr.width(alpha), COSINES, COSINES
-    values = f(*(nodes := Nodes.of(build, alpha)).arguments, *build.rule)
+    nodes = Nodes.of(build, alpha)
+    share = dr.rcp(growth(build, dr.detach(nodes.arguments[0]), *nodes.arguments[1:]))
+    values = [share * value for value in f(*nodes.arguments, *build.rule)]
     roots = [dr.sqrt(dr.maximum(value, SMALLEST)) if root else value for value, root in zip(values, rooted)]
     entries = [nodes.entries(root) for root in roots]
     dr.eval(entries)
     tables = [Table(one, shape, build.terms) for one in entries]
-    return [PairTable(table, least, extent, build.near, root) for table, root in zip(tables, rooted)]
+    return [PairTable(table, least, extent, build, root) for table, root in zip(tables, rooted)]
 
 
 @dataclass
@@ -144,8 +153,8 @@ class Nodes:
 
     @staticmethod
     def phi(build: Build) -> np.ndarray:
-        """The azimuths, in (0, pi)."""
-        return (np.arange(build.azimuths) + 0.5) * math.pi / build.azimuths
+        """The azimuths, in (0, pi): Chebyshev's nodes of t."""
+        return 2 * np.arccos((1 + np.cos((np.arange(build.azimuths) + 0.5) * math.pi / build.azimuths)) / 2)
 
     def entries(self, values: Any) -> Any:
         """Coefficients, innermost, of each roughness and pair of directions in either order: least squares."""
