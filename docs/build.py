@@ -10,6 +10,9 @@ from pathlib import Path
 
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- parameters: made by docs/build.py -->", "<!-- end of parameters -->"
+MACBETH = {"orange": (214, 126, 44), "blue flower": (133, 128, 177), "bluish green": (103, 189, 170)}
+"""Patches of the ColorChecker, as its maker gives them: sRGB of 8 bits."""
+INDICES = (1.0, 1.2, 1.33, 1.5)
 STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", "dirty-weave")
 
 
@@ -41,6 +44,33 @@ def strip(path: Path, size: int = 256, spp: int = 256) -> None:
         scene = preview(preset.material, **preset.preview, size=(size, size), spp=spp)
         images.append(np.asarray(mi.render(mi.load_dict(scene, parallel=False))))
     mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)[..., :3]), write_async=False)
+
+
+def linear(patch: str) -> list[float]:
+    """Reflectance of a patch in linear RGB (IEC 61966-2-1)."""
+    values = [channel / 255 for channel in MACBETH[patch]]
+    return [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values]
+
+
+def painted(patch: str, index: float) -> dict:
+    """The patch as the body below an interface of this index."""
+    colour = {"type": "rgb", "value": linear(patch)}
+    return {"type": "interfacedlambertian", "diffuse_reflectance": colour, "int_ior": index, "ext_ior": 1.0}
+
+
+def patches(path: Path, size: int = 128, spp: int = 144) -> None:
+    """Spheres of three colours (rows) under interfaces of four indices."""
+    import mitsuba as mi
+    import numpy as np
+
+    from asperity.scenes.preview import preview
+
+    mi.set_variant("llvm_ad_rgb")
+    rows = [[painted(patch, index) for index in INDICES] for patch in MACBETH]
+    scenes = [[preview(one, object="sphere", env="studio", size=(size, size), spp=spp) for one in row] for row in rows]
+    images = [[np.asarray(mi.render(mi.load_dict(s, parallel=False)))[..., :3] for s in row] for row in scenes]
+    picture = np.concatenate([np.concatenate(row, axis=1) for row in images])
+    mi.util.write_bitmap(str(path), mi.TensorXf(picture), write_async=False)
 
 
 def save(figure, path: Path) -> None:
@@ -79,6 +109,7 @@ def main() -> None:
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         figures(DOCS / "pictures")
+        patches(DOCS / "pictures" / "macbeth.png")
 
 
 if __name__ == "__main__":

@@ -2,10 +2,10 @@
 
 import asperity  # noqa: F401  isort: skip
 import cavity_paths
+import helpers
 import mitsuba as mi
 import numpy as np
 import pytest
-from helpers import unit
 from test_accuracy import pairs
 
 from asperity.lab import evaluate
@@ -29,7 +29,7 @@ def errors(rng, kind, alpha_u, alpha_v, n, count, paths, scattering="double"):
     context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), 1)
     bsdf = white(kind, alpha_u, alpha_v, n, scattering)
     found = np.array(bsdf.eval(context, evaluate.interaction(wi), wo).x)
-    i, o = (unit(np.array([*map(np.array, w)], dtype=float)) for w in (wi, wo))
+    i, o = (helpers.unit(np.array([*map(np.array, w)], dtype=float)) for w in (wi, wo))
     normals = DISTRIBUTIONS[kind](*map(cavity_paths.Float, (alpha_u, alpha_v)))
     traced = cavity_paths.body_light(normals, n, i, o, body.body_albedo(1.0, n), paths) * o[2]
     return np.abs(found / traced - 1)[traced > 1e-3]
@@ -68,9 +68,25 @@ QUICK = [("beckmann", (1.5, 1.5), 1.5), ("ggx", (0.6, 0.6), 2.5), ("gaussian", (
     ids=[f"{kind}-{alphas}-{n}" for kind, alphas, n in FURNACES],
 )
 def test_white_furnace(rgb, kind, alphas, n):
-    """No light is lost, nor gained: to .1 %, a fifth of what is asked for. Sobol's 2^16 points are good to .05 %."""
+    """No light is lost, nor gained: to .2 %; .5 % is asked for. Sobol's 2^16 points are good to .05 %."""
     theta = np.radians([0, 30, 60, 75, 83, 87])
     for phi in (0.3,) if alphas[0] == alphas[1] else (0, 0.8, np.pi / 2):
         wi = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
         albedo = evaluate.albedo(white(kind, *alphas, n, "multiple"), wi, 2**16)[0]
-        np.testing.assert_allclose(albedo, 1, atol=1e-3)
+        np.testing.assert_allclose(albedo, 1, atol=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["beckmann", "ggx"])
+@pytest.mark.parametrize("scattering, bounces, tolerance", [("single", 1, 2e-5), ("double", 2, 2e-3)])
+def test_black_bodies_leave_mirrors_in_grooves(rgb, kind, scattering, bounces, tolerance):
+    """Those of `vgroove` with as many bounces: for one, Cook and Torrance's.
+
+    It shares no formula with this model; its product of several reflectances is a closed form that is good to 2e-3.
+    """
+    wi, wo = (mi.Vector3f(helpers.directions(np.random.default_rng(seed), 2000, 0.05)) for seed in (1, 2))
+    given = {"alpha": 0.4, "distribution": kind}
+    ours = {"type": "interfacedlambertian", "diffuse_reflectance": 0.0, "int_ior": 1.5, "ext_ior": 1.0}
+    grooves = {"type": "vgroove", "eta": 1.5, "k": 0.0, "max_bounces": bounces}
+    found = helpers.values(given | ours | {"masking": "vcavity", "scattering": scattering}, wi, wo)
+    expected = helpers.values(given | grooves, wi, wo)
+    np.testing.assert_allclose(found, expected, rtol=tolerance, atol=1e-6)
