@@ -18,7 +18,7 @@ from ..models.interfacedlambertian import InterfacedLambertian
 from ..models.interfacedlambertian.body import body_albedo, body_integral
 from ..models.interfacedlambertian.facets import DISTRIBUTIONS, SmithFacets
 from ..models.interfacedlambertian.microgeometry import ExplicitCavities
-from ..models.interfacedlambertian.microgeometry import InterfacedLambertian as InterfacedLambertianFacet
+from ..models.interfacedlambertian.microgeometry import InterfacedFacet
 from . import figures
 from .report import Effort, Finding, Section, Table, agreement
 
@@ -279,7 +279,7 @@ def plane(title: str, measured: Measurement, model: np.ndarray) -> Any:
 # --- Fig. 10 and 15 --------------------------------------------------------------------------------------------------
 
 
-class Body(InterfacedLambertianFacet):
+class Body(InterfacedFacet):
     """A facet whose interface mirrors nothing, if light is followed to its first facet: it can be aimed at."""
 
     def flags(self) -> int:

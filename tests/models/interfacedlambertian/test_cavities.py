@@ -9,7 +9,7 @@ from helpers import gauss, towards
 from asperity.errors import ParameterError
 from asperity.goniophotometer import Hemisphere, Points, measure
 from asperity.lab import evaluate
-from asperity.models.interfacedlambertian.microgeometry import ExplicitCavities, InterfacedLambertian
+from asperity.models.interfacedlambertian.microgeometry import ExplicitCavities, InterfacedFacet
 
 FIG_7 = {
     0.1: (0.9947, 0.9991),
@@ -42,7 +42,7 @@ def test_reflectance_of_rough_surfaces(rgb, alpha, published):
 def test_a_facet_is_nonlinear_plastic(rgb, eta):
     """But for the inner reflectance, of which Mitsuba has a fit: .1 % for a white body and these indices."""
     plastic = {"type": "plastic", "int_ior": eta, "ext_ior": 1.0, "diffuse_reflectance": 0.9, "nonlinear": True}
-    ours, si = InterfacedLambertian(0.9, eta), evaluate.interaction(evaluate.vectors(towards(50)[None]), 3)
+    ours, si = InterfacedFacet(0.9, eta), evaluate.interaction(evaluate.vectors(towards(50)[None]), 3)
     wo = evaluate.vectors(np.stack([towards(theta, 80) for theta in (5, 40, 80)]))
     found, expected = (np.array(bsdf.eval(mi.BSDFContext(), si, wo, True)) for bsdf in (ours, mi.load_dict(plastic)))
     assert found == pytest.approx(expected, rel=2e-3)

@@ -20,7 +20,7 @@ TRIES = 8
 """Of Gaussian normals, whose samples are too steep by a / sin a < pi / 2: after as many rejections, .03 % still are."""
 
 
-class InterfacedLambertian:
+class InterfacedFacet:
     """A facet: a smooth interface of relative index ``eta`` over a body that scatters evenly, of this ``albedo``.
 
     Light is reflected with probability F, or else leaves evenly and refracted: T_o Q / pi (Meneveaux et al. 2018,
@@ -110,7 +110,7 @@ class ExplicitCavities:
 
     def piece(self, rng: np.random.Generator) -> Grooves:
         """Always the same; the cavities are drawn with the rays."""
-        return Grooves(self.draw, InterfacedLambertian(self.albedo, self.eta))
+        return Grooves(self.draw, InterfacedFacet(self.albedo, self.eta))
 
     def draw(self, rng: mi.PCG32) -> Shape:
         """A cavity by ground area: that of a normal with density D cos."""
