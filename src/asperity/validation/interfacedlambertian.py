@@ -17,8 +17,7 @@ from ..microfacet.distributions import Gaussian
 from ..models.interfacedlambertian import InterfacedLambertian
 from ..models.interfacedlambertian.body import body_albedo, body_integral
 from ..models.interfacedlambertian.facets import DISTRIBUTIONS, SmithFacets
-from ..models.interfacedlambertian.microgeometry import ExplicitCavities
-from ..models.interfacedlambertian.microgeometry import InterfacedFacet
+from ..models.interfacedlambertian.microgeometry import ExplicitCavities, InterfacedFacet
 from . import figures
 from .report import Effort, Finding, Section, Table, agreement
 

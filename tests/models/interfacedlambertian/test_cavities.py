@@ -65,5 +65,5 @@ def test_wrong_cavities_are_refused(wrong, complaint):
 
 def test_mirrors_cannot_be_aimed_at(rgb):
     """They are in these facets, which are none of Mitsuba's BSDFs."""
-    with pytest.raises(ParameterError, match=r"'facets' are mirrors \(InterfacedLambertian\)"):
+    with pytest.raises(ParameterError, match=r"'facets' are mirrors \(InterfacedFacet\)"):
         measure(ExplicitCavities(), [(30, 0)], sensor=Points(((30, 0),)), paths=1)
