@@ -278,7 +278,7 @@ def plane(title: str, measured: Measurement, model: np.ndarray) -> Any:
 # --- Fig. 10 and 15 --------------------------------------------------------------------------------------------------
 
 
-class Body(InterfacedFacet):
+class UnmirroredFacet(InterfacedFacet):
     """A facet whose interface mirrors nothing, if light is followed to its first facet: it can be aimed at."""
 
     def flags(self) -> int:
@@ -286,12 +286,12 @@ class Body(InterfacedFacet):
         return int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide)
 
 
-class Bodies(ExplicitCavities):
+class UnmirroredCavities(ExplicitCavities):
     """Cavities of such facets."""
 
     def piece(self, rng: np.random.Generator) -> Grooves:
         """Always the same."""
-        return Grooves(self.draw, Body(self.albedo, self.eta))
+        return Grooves(self.draw, UnmirroredFacet(self.albedo, self.eta))
 
 
 def curves(effort: Effort) -> Section:
@@ -333,7 +333,7 @@ def curves(effort: Effort) -> Section:
 def curve(kind: str, n: float, alpha: float, effort: Effort) -> tuple[Estimate, dict[str, np.ndarray]]:
     """f cos_o along the plane of incidence, traced and by the models: (directions, channels)."""
     points = Points(tuple((abs(theta), 0.0 if theta < 0 else 180.0) for theta in OUTGOING))
-    measured = shoot(Bodies(kind, alpha, alpha, ALBEDOS, n), [THETA_PHI], effort, orders=1, sensor=points)
+    measured = shoot(UnmirroredCavities(kind, alpha, alpha, ALBEDOS, n), [THETA_PHI], effort, orders=1, sensor=points)
     description, wi, wo = paint(kind, alpha, n), measured.wi[0], measured.sensor.directions(measured.wi[0])[:, 0]
     kinds: dict[str, dict[str, Any]] = {"V-cavities": {}, "`approximate`": {"approximate": True}}
     if kind != "gaussian" or alpha <= Gaussian.largest_smith:
