@@ -13,7 +13,7 @@ from typing import Any
 
 import drjit as dr
 
-from .numerics import clamp, log1p
+from .numerics import clamp, log1p, one_minus_exp
 from .quadrature import gauss_legendre
 from .tables import Table, native
 
@@ -92,7 +92,7 @@ def smith_lambda(p: Any, t: Any) -> Any:
     first = dr.exp(-2 * p * dr.log(t))
     extent = log1p(25 / first) / (2 * p)  # where facets are e^-25 times as many
     log_s = extent * dr.square(node)
-    tangent = dr.sqrt(dr.exp(2 * log_s) - 1)
+    tangent = dr.sqrt(dr.exp(2 * log_s) * one_minus_exp(2 * log_s))
     facets = dr.exp(2 * log_s - first * dr.exp(2 * p * log_s)) / dr.square(t)
     term = 2 * facets * (tangent - dr.atan(tangent)) * 2 * extent * node * weight
     return dr.block_sum(term, RULE) * p * dr.exp(-dr.lgamma(1 / p)) / dr.pi

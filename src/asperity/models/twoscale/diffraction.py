@@ -80,7 +80,8 @@ class Peak:
     @classmethod
     def at(cls, angle: Any, width: Any) -> Peak:
         """The tilt ``angle``."""
-        return cls(*dr.sincos(angle), angle, width)
+        sin, cos = dr.sincos(angle)
+        return cls(sin, cos, angle, width)
 
 
 @dataclass

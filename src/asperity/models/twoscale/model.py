@@ -114,6 +114,10 @@ class TwoScale(LobeModel):
         alphas = [type(self).alpha.clamp(constant(*item)) for item in self.alpha.textures.items()]
         self.known.update(partial(Known.made, self.bands, self.energy == "conserving"), *numbers, *alphas)
 
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Heights from a nanometre on: of what grows with their square, no derivative at 0 sees that it would."""
+        return super().ranges() | {"sigma_s": (1e-3, type(self).sigma_s.high)}
+
     def flags(self) -> list[int]:
         """Two glossy lobes."""
         return [glossy(self.alpha.isotropic)] * 2

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...microfacet.epd import Power, Profile
 from ...microfacet.ggx import inclination
-from ...microfacet.numerics import clamp, heading, one_minus_exp
+from ...microfacet.numerics import clamp, heading, log1p, one_minus_exp
 from ...microfacet.tables import Table, array_types, native
 from .diffraction import asinh, convolution, propagating, smooth_albedo, spread, stretched_convolution
 
@@ -224,7 +224,7 @@ def lost(b: Any, c: Any, bands: Bands, R: ByWavelength) -> ByWavelength:
             return one_minus_exp(k2 * dr.square(cos_d) * fraction) / fraction
 
         T = smooth_albedo(share, dr.sqrt(1 - cos * cos), cos, b / wavelength, c, (k2, wavelength))
-        return -dr.log(1 - dr.minimum(T, 1 - 1e-6)) / k2
+        return -log1p(-dr.minimum(T, 1 - 1e-6)) / k2
 
     return bands.tabulate(exponent, type(b), *LOST)
 
