@@ -39,7 +39,8 @@ class Profile:
 
     def __call__(self, x: Any) -> Any:
         """P22 at the squared slope ``x``."""
-        return self.density * dr.exp(-dr.exp(self.p * dr.log(dr.maximum(x, 1e-20))))  # a power has no derivative at 0
+        # A power has no derivative at 0; and where e^7 is exceeded, 0.
+        return self.density * dr.exp(-dr.exp(dr.minimum(self.p * dr.log(dr.maximum(x, 1e-20)), 7)))
 
     def density_of_tilts(self, alpha: Any, sin: Any, cos: Any) -> Any:
         """D per steradian, of roughness ``alpha``, at the tilt with this sine and cosine."""

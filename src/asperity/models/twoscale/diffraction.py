@@ -255,7 +255,7 @@ def tilt_parts(p: Any, alpha: Any, u: Any, sin: Any, cos: Any, sin_phi: Any, cos
 
 
 def smooth_albedo(
-    share: Callable, sin: Any, cos: Any, B: Any, c: Any, others: Sequence[Any] = (), rule: tuple[int, int] = (16, 12)
+    share: Callable, sin: Any, cos: Any, B: Any, c: Any, others: Sequence[Any] = (), rule: tuple[int, int] = (24, 16)
 ) -> Any:
     """T: what a smooth facet diffracts of the light from this inclination, without Fresnel's term.
 
@@ -263,16 +263,15 @@ def smooth_albedo(
     """
     radii = Lanes(sin, rule[0])
     sin, cos, B, *others = (radii.repeat(x) for x in (sin, cos, B, *others))
-    disc = Disc(sin, B, c)
+    disc = Disc(sin, dr.detach(B), dr.detach(c))
     r = disc.radius(radii.node)
+    drawn = scale(B, c, 1) * spread(dr.square(B * r), c) / disc.density(r)
     lanes = Lanes(r, rule[1])
-    reach, total = lanes.repeat(disc.reach(r)), disc.total()
-    r, sin, cos, *others = (lanes.repeat(x) for x in (r, sin, cos, *others))
+    reach, drawn, r, sin, cos, *others = (lanes.repeat(x) for x in (disc.reach(r), drawn, r, sin, cos, *others))
     sin_psi, cos_psi = dr.sincos(lanes.node * reach)
     up = cos + dr.sqrt(dr.maximum(1 - dr.square(r * cos_psi - sin) - dr.square(r * sin_psi), 0))
     square = (dr.square(r) + dr.square(up)) / 4  # cos_d^2, of which (h.n)^2 is the part up^2 / 4
-    found = share(dr.sqrt(square), *others) * dr.square(up) / (4 * square) * (reach / dr.pi)
-    return radii.sum(total * lanes.sum(found))
+    return radii.sum(lanes.sum(share(dr.sqrt(square), *others) * drawn * dr.square(up) / (4 * square)))
 
 
 @dataclass
@@ -300,5 +299,5 @@ class Disc:
 
     def density(self, r: Any) -> Any:
         """By area at the distance r, of radii as drawn and azimuths evenly within reach."""
-        profile = spread(dr.square(self.B * r), self.c) * dr.square(self.B) * (self.c - 1)
-        return profile / (2 * self.total() * dr.maximum(self.reach(r), 1e-6))
+        spectrum = scale(self.B, self.c, self.total()) * spread(dr.square(self.B * r), self.c)
+        return spectrum * dr.pi / dr.maximum(self.reach(r), 1e-6)

@@ -22,7 +22,7 @@ VISIBLE = 0.36, 0.83
 """Ends of the wavelengths that Mitsuba samples, in micrometres."""
 COSINES, COLOURS = 64, 32
 """Nodes of R, over cos_d; and in spectral variants, over wavelengths."""
-LOST = (12, 32), 12
+LOST = (24, 24), 6
 """The same of what smooth facets lose, over the phase and cos_d."""
 EVEN, STRETCHED = (32, 96), (9, 24, 64)
 """Nodes of the convolution over u and the tilt of h; of two roughnesses, over the azimuth of h first."""
@@ -119,7 +119,7 @@ class Layout:
     @classmethod
     def of(cls, alpha: Any, highest: Any, flat: Any) -> Layout:
         """For the smaller roughness, the highest frequency, and a quarter of the variance of slopes."""
-        near = 0.3 * dr.sqrt(dr.square(dr.minimum(alpha, 0.1)) + dr.square(0.5 / highest))
+        near = 0.3 * dr.sqrt(dr.square(dr.minimum(alpha, 0.05)) + dr.square(0.5 / highest))
         return cls(highest, dr.minimum(near, 0.25), dr.clip(3 * dr.sqrt(flat), 0.005, 0.09))
 
     def native(self) -> Layout:
@@ -157,24 +157,25 @@ class Convolved:
     table: Table
     layout: Layout
     ratios: list[float]  # of the channels' u to the highest, of which all are read at once
-    flat: Any  # a quarter of the variance of slopes, at most .075
+    flat: tuple[Any, Any]  # quarters of the variance of slopes across and along the larger roughness, at most .075
     turned: Any  # of two roughnesses: 0 if that along x is larger, or else 1
 
     @classmethod
     def of(cls, profile: Profile, alpha: Sequence[Any], b: Any, c: Any, bands: Bands) -> Convolved:
         """For one roughness or two."""
         Float, larger, smaller = type(b), dr.maximum(alpha[0], alpha[-1]), dr.minimum(alpha[0], alpha[-1])
-        flat = dr.minimum(dr.detach(larger * smaller * profile.variance()), 0.3) / 4
-        layout = Layout.of(dr.detach(smaller), dr.detach(b) / bands.shortest, flat)
+        variance = dr.detach(profile.variance())
+        flat = tuple(dr.minimum(dr.square(dr.detach(one)) * variance, 0.3) / 4 for one in (smaller, larger))
+        layout = Layout.of(dr.detach(smaller), dr.detach(b) / bands.shortest, flat[0])
         axes, ratios = (EVEN, bands.ratios) if len(alpha) == 1 else (STRETCHED, [1.0])
-        *azimuth, frequency, tilt = (dr.repeat(x, len(ratios)) for x in grid(Float, axes))
+        *along, frequency, tilt = (dr.repeat(x, len(ratios)) for x in grid(Float, axes))
         (sin, cos), u = layout.tilt(tilt), layout.u(frequency) * dr.tile(Float(ratios), prod(axes))
-        if azimuth:
-            turn = dr.acos(dr.sqrt(azimuth[0]))
+        if along:
+            turn = dr.acos(dr.sqrt(along[0]))
             V = stretched_convolution(profile, (larger, smaller), c, u, sin, cos, turn)
         else:
             V = convolution(profile, larger, c, u, sin, cos)
-        found, UInt = dr.log(V / like(c, u, sin, cos, flat)), dr.uint32_array_t(Float)
+        found, UInt = dr.log(V / like(c, u, sin, cos, between(flat, along))), dr.uint32_array_t(Float)
         nodes = len(ratios) * dr.arange(UInt, prod(axes))
         table = packed(axes, [dr.gather(Float, found, nodes + n) for n in range(len(ratios))])
         turned = dr.select(dr.detach(alpha[0] >= alpha[-1]), Float(0), Float(1))
@@ -182,21 +183,26 @@ class Convolved:
 
     def native(self) -> Convolved:
         """The same for the active variant."""
-        numbers = native(self.flat), native(self.turned)
-        return Convolved(self.table.native(), self.layout.native(), self.ratios, *numbers)
+        across, along = map(native, self.flat)
+        return Convolved(self.table.native(), self.layout.native(), self.ratios, (across, along), native(self.turned))
 
     def at(self, c: Any, u: Any, h: Any) -> Any:
         """V of a spectrum of frequencies ``u``: those of the channels, or any."""
         sin, cos = inclination(h)
-        x, tilt = [], self.layout.of_tilt(sin / (1 + cos))
+        along, tilt = [], self.layout.of_tilt(sin / (1 + cos))
         if len(self.table.shape) == 3:
-            x_h, y_h = heading(h.x, h.y)
-            x = [dr.lerp(dr.square(x_h), dr.square(y_h), self.turned)]
+            x, y = heading(h.x, h.y)
+            along = [dr.lerp(dr.square(x), dr.square(y), self.turned)]
         if len(self.ratios) == 1:
-            found = [self.table.at(*x, self.layout.of_u(one), tilt)[0] for one in u]
+            found = [self.table.at(*along, self.layout.of_u(one), tilt)[0] for one in u]
         else:
-            found = self.table.at(*x, self.layout.of_u(u[self.ratios.index(1)]), tilt)[: len(u)]
-        return dr.exp(type(u)(found)) * like(c, u, sin, cos, self.flat)
+            found = self.table.at(self.layout.of_u(u[self.ratios.index(1)]), tilt)[: len(u)]
+        return dr.exp(type(u)(found)) * like(c, u, sin, cos, between(self.flat, along))
+
+
+def between(flat: tuple[Any, Any], along: list[Any]) -> Any:
+    """The variance at an azimuth, by the squared cosine between it and the larger roughness; of one, any."""
+    return dr.lerp(*flat, along[0]) if along else flat[0]
 
 
 def like(c: Any, u: Any, sin: Any, cos: Any, flat: Any) -> Any:
