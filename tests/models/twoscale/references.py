@@ -3,25 +3,15 @@
 import numpy as np
 from scipy.special import gamma
 
-ALPHA_MAX = {
-    5: 0.058,
-    4: 0.068,
-    3: 0.085,
-    2: 0.104,
-    1.4: 0.153,
-    1: 0.348,
-    0.8: 0.461,
-    0.6: 0.448,
-    0.4: 0.261,
-    0.2: 0.015,
-}
-"""Largest width for an exponent, up to which the authors have tables."""
+EXPONENTS = [0.2, 0.4, 0.6, 0.8, 1, 1.4, 2, 3, 4, 5]
+LARGEST = [0.015, 0.261, 0.448, 0.461, 0.348, 0.153, 0.104, 0.085, 0.068, 0.058]
+"""Width for an exponent, up to which the authors have tables."""
 
 
 def material(rng):
     """(alpha, p, b, c) within the range of the authors' tables."""
-    p, known = np.exp(rng.uniform(*np.log([0.2, 5]))), sorted(ALPHA_MAX)
-    alpha = np.interp(p, known, [ALPHA_MAX[one] for one in known]) * rng.uniform(0.05, 1)
+    p = np.exp(rng.uniform(*np.log([0.2, 5])))
+    alpha = np.interp(p, EXPONENTS, LARGEST) * rng.uniform(0.05, 1)
     return max(alpha, 1e-3), p, np.exp(rng.uniform(*np.log([0.05, 20]))), rng.uniform(1.02, 3.02)
 
 

@@ -1,4 +1,4 @@
-"""Diffraction: R, the convolution and the albedo of smooth facets, by quadrature that takes nothing from the package."""
+"""Diffraction: R, the convolution, the albedo of smooth facets; by quadrature that takes nothing from the package."""
 
 import asperity  # noqa: F401  isort: skip
 import drjit as dr

@@ -32,9 +32,9 @@ def looked_up(alphas, p, b, c, cos_d, h):
 
 
 def test_the_convolution(rgb):
-    """50 materials, 3 channels, 500 half vectors; the other nodes' own error is below 1e-5."""
+    """Of 20 materials, 3 channels, 500 half vectors; the integral is good to 1e-5."""
     errors = []
-    for seed in range(50):
+    for seed in range(20):
         rng = np.random.default_rng(seed)
         alpha, p, b, c = references.material(rng)
         theta, cos_d = references.tilts(rng, 500, alpha), rng.uniform(0.01, 1, 500)

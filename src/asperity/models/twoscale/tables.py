@@ -250,7 +250,8 @@ class Known:
     def made(cls, bands: Bands, conserving: bool, *constants: Any) -> Known:
         """For the active variant: of p, b, c, and one roughness, or those along x and y."""
         Float, _ = array_types("alpha")
-        p, b, c, *alpha = map(Float, constants)
+        p, b, c, *alpha = numbers = [Float(constant) for constant in constants]
+        dr.make_opaque(numbers)  # else every other number compiles anew
         power = Power.of(p)
 
         def share(index: int, wavelength: Any, cos: Any) -> Any:
