@@ -24,7 +24,7 @@ COSINES, COLOURS = 64, 32
 """Nodes of R, over cos_d; and in spectral variants, over wavelengths."""
 LOST = (24, 24), 6
 """The same of what smooth facets lose, over the phase and cos_d."""
-EVEN, STRETCHED = (32, 96), (9, 24, 64)
+EVEN, STRETCHED = (28, 108), (9, 24, 64)
 """Nodes of the convolution over u and the tilt of h; of two roughnesses, over the azimuth of h first."""
 
 
@@ -119,7 +119,7 @@ class Layout:
     @classmethod
     def of(cls, alpha: Any, highest: Any, flat: Any) -> Layout:
         """For the smaller roughness, the highest frequency, and a quarter of the variance of slopes."""
-        near = 0.3 * dr.sqrt(dr.square(dr.minimum(alpha, 0.05)) + dr.square(0.5 / highest))
+        near = 0.3 * dr.sqrt(dr.square(dr.minimum(alpha, 0.04)) + dr.square(0.5 / highest))
         return cls(highest, dr.minimum(near, 0.25), dr.clip(3 * dr.sqrt(flat), 0.005, 0.09))
 
     def native(self) -> Layout:
