@@ -78,7 +78,7 @@ SPREAD = {
     "twoscale": {
         "default": {},
         "gold": {"material": "Au", "sigma_s": 0.05},
-        "smooth": {"alpha": 0.01, "p": 1.0, "sigma_s": 0.01},
+        "smooth": {"alpha": 0.01, "p": 1.0, "sigma_s": 0.01, "material": "Al"},  # as published, mirrors gain .4 %
         "tails": {"alpha": 0.04, "p": 0.3, "b": 4.0},
         "flat": {"alpha": 0.08, "p": 3.0, "b": 0.4, "sigma_s": 0.03, "masking": "height"},
         "rough": {"alpha": 0.3, "p": 1.0, "c": 1.5, "masking": "separable"},

@@ -208,10 +208,10 @@ BAD = {
     "sigma_s": ({"sigma_s": -0.1}, r"sigma_s = -0.1: expected a number or texture in \[0, 10\]"),
     "nanometres": (
         {"wavelengths": [650.0, 550.0, 450.0]},
-        r"wavelengths = 650 µm: expected three numbers in \[0.1, 20\] µm: nanometres\? 650 nm are 0.65 µm",
+        r"wavelengths = 650 µm: expected three numbers in \[0.1, 20\] µm; 650 nm are 0.65 µm",
     ),
     "negative": ({"wavelengths": [0.65, -0.55, 0.45]}, r"wavelengths = -0.55 µm: expected three numbers in"),
-    "one": ({"wavelengths": 0.55}, r"wavelengths = 0.55: expected a three numbers"),
+    "one": ({"wavelengths": 0.55}, r"wavelengths = 0.55: expected three numbers in \[0.1, 20\] µm"),
     "textured alpha": ({"alpha": CHECKED}, "alpha: a texture, where one number for the whole surface is expected"),
     "textured alpha_u": ({"alpha_u": CHECKED}, "alpha_u: a texture, where one number"),
     "textured p": (

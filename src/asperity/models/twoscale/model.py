@@ -13,7 +13,7 @@ from ...errors import ParameterError
 from ...lobes import Lifted, Lobe, LobeModel, glossy
 from ...microfacet.distributions import EPD
 from ...microfacet.tables import Made
-from ...parameters import Axes, Choice, Constant, Parameter, Texture, Usual, constant
+from ...parameters import Choice, Constant, ConstantAxes, Parameter, Texture, Usual, constant
 from .lobes import MASKING, Diffracted, Mirrored, Surface, lift
 from .tables import Bands, Known
 
@@ -45,17 +45,16 @@ class Wavelengths(Parameter):
 
     def parse(self, props: mi.Properties) -> tuple[float, ...]:
         """The numbers, each within the range."""
-        given = props.get(self.name, self.default)
+        given, expected = props.get(self.name, self.default), f"expected three numbers in {self.allowed()} µm"
         try:
-            red, green, blue = found = tuple(round(float(one), 7) for one in given)  # which Mitsuba made float32
+            red, green, blue = (round(float(one), 7) for one in given)  # which Mitsuba made float32
         except (TypeError, ValueError) as error:
-            raise self.wrong(self.name, repr(given)) from error
+            raise ParameterError(f"{self.name} = {given!r}: {expected}.") from error
         for one in (red, green, blue):
             if not self.low <= one <= self.high:
-                nanometres = 1e3 * self.low <= one <= 1e3 * self.high
-                hint = f": nanometres? {one:g} nm are {one / 1e3:g} µm" if nanometres else ""
-                raise ParameterError(f"{self.name} = {one:g} µm: expected three numbers in {self.allowed()} µm{hint}.")
-        return found
+                nanometres = f"; {one:g} nm are {one / 1e3:g} µm" if self.low <= one / 1e3 <= self.high else ""
+                raise ParameterError(f"{self.name} = {one:g} µm: {expected}{nanometres}.")
+        return red, green, blue
 
 
 class TwoScale(LobeModel):
@@ -70,8 +69,8 @@ class TwoScale(LobeModel):
     citation = CITATION
 
     metal = Conductor("metal", "none")
-    alpha = Axes(
-        "width of the distribution of facets, the roughness if p = 1; the same everywhere",
+    alpha = ConstantAxes(
+        "width of the distribution of facets, which is the roughness if p = 1; never squared",
         0.1,
         low=1e-3,
         high=1.0,
