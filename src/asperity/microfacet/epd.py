@@ -14,7 +14,7 @@ from typing import Any
 import drjit as dr
 
 from .numerics import clamp, log1p, one_minus_exp
-from .quadrature import gauss_legendre
+from .quadrature import Lanes
 from .tables import Table, native
 
 NODES = 64
@@ -87,16 +87,15 @@ def smith_lambda(p: Any, t: Any) -> Any:
 
     Of the facets of slope s the share beyond the horizon projects to T - atan T, T^2 = (s t)^2 - 1 (Eq. 36 and 37).
     """
-    Float = type(t)
-    node, weight = (dr.tile(Float(values), dr.width(t)) for values in gauss_legendre(RULE))
-    t, p = dr.repeat(t, RULE), Float(p)
+    lanes = Lanes(t, RULE)
+    t = lanes.repeat(t)
     first = dr.exp(-2 * p * dr.log(t))
     extent = log1p(25 / first) / (2 * p)  # where facets are e^-25 times as many
-    log_s = extent * dr.square(node)
+    log_s = extent * dr.square(lanes.node)
     tangent = dr.sqrt(dr.exp(2 * log_s) * one_minus_exp(2 * log_s))
     facets = dr.exp(2 * log_s - first * dr.exp(2 * p * log_s)) / dr.square(t)
-    term = 2 * facets * (tangent - dr.atan(tangent)) * 2 * extent * node * weight
-    return dr.block_sum(term, RULE) * p * dr.exp(-dr.lgamma(1 / p)) / dr.pi
+    integrand = 2 * facets * (tangent - dr.atan(tangent)) * 2 * extent * lanes.node
+    return lanes.sum(integrand) * p * dr.exp(-dr.lgamma(1 / p)) / dr.pi
 
 
 def masking_table(p: Any) -> Table:

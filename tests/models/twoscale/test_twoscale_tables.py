@@ -12,7 +12,7 @@ from helpers import float64
 
 from asperity.lab import evaluate
 from asperity.microfacet.epd import Profile
-from asperity.models.twoscale import diffraction
+from asperity.models.twoscale import convolution, diffraction
 from asperity.models.twoscale.tables import Bands, Convolved, Known
 
 CHANNELS = np.array([0.653, 0.546, 0.444])
@@ -41,7 +41,7 @@ def test_the_convolution(rgb):
         found, u = looked_up([alpha], p, b, c, cos_d, half_vectors(theta))
         numbers = (float64(np.tile(x, 3)) for x in (np.sin(theta), np.cos(theta)))
         u = float64(u.ravel())
-        expected = diffraction.convolution(Profile.of(float64(p)), float64(alpha), float64(c), u, *numbers, nodes=12)
+        expected = convolution.convolution(Profile.of(float64(p)), float64(alpha), float64(c), u, *numbers, nodes=12)
         errors.append(np.abs(found.ravel() / np.array(expected) - 1))
     assert np.percentile(errors, 99) < P99 and np.max(errors) < WORST
 
@@ -56,7 +56,7 @@ def test_the_convolution_of_two_roughnesses(rgb, alphas, p, b):
     azimuth = np.arccos(np.abs(np.cos(phi) if alphas[0] > alphas[1] else np.sin(phi)))
     numbers = (float64(np.tile(x, 3)) for x in (np.sin(theta), np.cos(theta), azimuth))
     ends, u = (float64(max(alphas)), float64(min(alphas))), float64(u.ravel())
-    expected = diffraction.stretched_convolution(Profile.of(float64(p)), ends, float64(2.3), u, *numbers)
+    expected = convolution.stretched_convolution(Profile.of(float64(p)), ends, float64(2.3), u, *numbers)
     errors = np.abs(found.ravel() / np.array(expected) - 1)
     assert np.percentile(errors, 99) < P99 and np.max(errors) < WORST
 

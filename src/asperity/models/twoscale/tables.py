@@ -16,7 +16,8 @@ from ...microfacet.epd import Power, Profile
 from ...microfacet.ggx import inclination
 from ...microfacet.numerics import clamp, heading, log1p, one_minus_exp
 from ...microfacet.tables import Table, array_types, native
-from .diffraction import asinh, convolution, propagating, smooth_albedo, spread, stretched_convolution
+from .convolution import convolution, stretched_convolution
+from .diffraction import propagating, smooth_albedo, spread
 
 VISIBLE = 0.36, 0.83
 """Ends of the wavelengths that Mitsuba samples, in micrometres."""
@@ -49,7 +50,8 @@ class Bands:
     @property
     def typical(self) -> float:
         """One in the middle."""
-        return sorted(self.channels or (*VISIBLE, 0.55))[len(self.channels or "123") // 2]
+        channels = sorted(self.channels or (*VISIBLE, 0.55))
+        return channels[len(channels) // 2]
 
     @property
     def ratios(self) -> list[float]:
@@ -128,12 +130,12 @@ class Layout:
 
     def u(self, x: Any) -> Any:
         """The frequency at the coordinate ``x``; a little more than 0, which would be no wave."""
-        x = dr.exp(dr.maximum(x, 1e-4) * asinh(2 * self.highest))
+        x = dr.exp(dr.maximum(x, 1e-4) * dr.asinh(2 * self.highest))
         return (x - 1 / x) / 4
 
     def of_u(self, u: Any) -> Any:
         """The coordinate in [0, 1] of a frequency."""
-        return asinh(2 * u) / asinh(2 * self.highest)
+        return dr.asinh(2 * u) / dr.asinh(2 * self.highest)
 
     def tilt(self, x: Any) -> tuple[Any, Any]:
         """(sine, cosine) of the tilt at the coordinate ``x``."""
