@@ -288,6 +288,17 @@ class Axes(Texture):
 
 
 @dataclass(frozen=True)
+class ConstantAxes(Axes):
+    """`Axes` of numbers that are the same everywhere."""
+
+    kind: ClassVar[str] = "number"
+
+    def one(self, name: str) -> Texture:
+        """The parameter of one of these names."""
+        return Constant(self.meaning, self.default, low=self.low, high=self.high, unit=self.unit).named(name)
+
+
+@dataclass(frozen=True)
 class Spectrum(Texture):
     """A number in a range at each wavelength."""
 

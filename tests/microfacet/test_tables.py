@@ -79,6 +79,15 @@ def test_the_values_of_nodes_are_returned_bit_by_bit(rgb, shape):
     np.testing.assert_array_equal(found(table(values, mi.Float).at(*map(mi.Float, corners.T))).T, expected)
 
 
+def test_a_cubic_is_exact(any_variant):
+    """Whose values and derivatives are given at the nodes; beyond them, it is the value at the end."""
+    Float, _ = array_types("a test")
+    cubic, nodes = np.polynomial.Polynomial([0.3, -1, 2, 1.5]), np.linspace(0, 1, 5)
+    made = table(np.stack([cubic(nodes), cubic.deriv()(nodes)]), Float).native()
+    for x in (-1.0, 0.0, 0.1, 0.25, 0.7, 0.999, 1.0, 2.0):
+        assert np.ravel(made.cubic(mi.Float(x)))[0] == pytest.approx(cubic(np.clip(x, 0, 1)), abs=1e-6)
+
+
 def test_not_a_number_is_no_address(any_variant):
     Float, _ = array_types("a test")
     made, x = table(np.ones((1, 3, 4)), Float).native(), mi.Float(np.nan)

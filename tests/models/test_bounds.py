@@ -60,12 +60,21 @@ USED = {  # descriptions that use all parameters between them
         "ill-posed": {"distribution": "gaussian", "alpha": 0.2},
     },
     "orennayar": {"default": {}, "qualitative": {"variant": "qualitative"}},
+    "twoscale": {
+        "diffracting": METAL,
+        "conserving": {**TINT, "energy": "conserving", "masking": "height"},
+        "stretched": {"alpha_u": 0.2, "alpha_v": 0.05, "masking": "separable"},
+    },
 }
 FITS = [("lambertsphere", "fast"), ("lambertsphere", "published")]
 """Published fits, which are clamped to a constant where little is reflected: there is no derivative to be had."""
-CONSTANT = {"micrograin": {"beta", "beta_x", "beta_y"}, "interfacedlambertian": {"int_ior", "ext_ior"}}
-"""What does not vary over the surface if light scatters several times."""
-SLOW = {"coated", "non-symmetric", "non-symmetric beckmann", "non-symmetric phong"}
+CONSTANT = {
+    "micrograin": {"beta", "beta_x", "beta_y"},
+    "interfacedlambertian": {"int_ior", "ext_ior"},
+    "twoscale": {"alpha", "alpha_u", "alpha_v", "p", "b", "c"},
+}
+"""What does not vary over the surface, in the first two if light scatters several times."""
+SLOW = {"stretched", "coated", "non-symmetric", "non-symmetric beckmann", "non-symmetric phong"}
 CASES = [
     pytest.param(model, case, id=f"{model}-{case}", marks=[pytest.mark.slow] if case in SLOW else [])
     for model, cases in USED.items()
@@ -164,7 +173,7 @@ def test_texels_at_both_ends(rgb, model, case):
     """All parameters at once, each texel at one end or the other."""
     plain, rng = load(model, case), np.random.default_rng(5)
     # Tables are made from what is the same everywhere.
-    constant = CONSTANT.get(model, set()) if getattr(plain.model, "scattering", "single") != "single" else set()
+    constant = CONSTANT.get(model, set()) if getattr(plain.model, "scattering", None) != "single" else set()
 
     def texels(low, high):
         data = mi.TensorXf(rng.choice([low, high], (8, 8, 1)).astype(np.float32))

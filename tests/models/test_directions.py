@@ -24,6 +24,8 @@ CASES = {
     "interfaced cavities": {"type": "interfacedlambertian", "alpha": 0.4, "masking": "vcavity"},
     "interfaced anisotropic": {"type": "interfacedlambertian", "alpha_u": 0.2, "alpha_v": 0.5, "distribution": "ggx"},
     "orennayar": {"type": "orennayar", "sigma": 40.0},
+    "twoscale": {"type": "twoscale", "alpha": 0.2, "sigma_s": 0.05},
+    "twoscale anisotropic": {"type": "twoscale", "alpha_u": 0.1, "alpha_v": 0.3, "p": 1.0, "sigma_s": 0.05},
     "deon": {"type": "deon", "base": {"type": "diffuse"}},
     "merillou": {"type": "merillou", "base": {"type": "diffuse"}},
 }

@@ -22,6 +22,7 @@ CASES = {
     "cavities": {"type": "interfacedlambertian", "alpha": 0.6, "diffuse_reflectance": 0.9, "scattering": "multiple"},
     "interfacedlambertian": {"type": "interfacedlambertian", "alpha": 0.4, "diffuse_reflectance": 0.9},
     "orennayar": {"type": "orennayar", "sigma": 50.0},
+    "twoscale": {"type": "twoscale", "material": "Cu", "sigma_s": 0.06},
     "deon": {"type": "deon", "material": "Au", "base": BASE},
     "merillou": {"type": "merillou", "material": "Au", "base": BASE},
 }

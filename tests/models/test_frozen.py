@@ -23,6 +23,8 @@ CASES = {  # description, and a parameter to move
     "cavities": ({"type": "interfacedlambertian", "scattering": "multiple"}, "alpha.value"),
     "stretched": ({"type": "interfacedlambertian", "alpha_u": 0.2, "alpha_v": 0.5}, "alpha_u.value"),
     "orennayar": ({"type": "orennayar"}, "reflectance.value"),
+    "twoscale": ({"type": "twoscale", "energy": "conserving"}, "alpha.value"),
+    "diffracting": ({"type": "twoscale", "alpha_u": 0.2, "alpha_v": 0.1}, "p.value"),
     "deon": ({"type": "deon", "base": BASE}, "tau_0.value"),
     "merillou": ({"type": "merillou", "base": BASE}, "tau_0.value"),
 }

@@ -75,6 +75,17 @@ SPREAD = {
         "multiple": {"scattering": "multiple", "distribution": "ggx", "alpha": 0.7, "diffuse_reflectance": 1.0},
         "multiple anisotropic": {"scattering": "multiple", "alpha_u": 0.3, "alpha_v": 0.7},
     },
+    "twoscale": {
+        "default": {},
+        "gold": {"material": "Au", "sigma_s": 0.05},
+        "smooth": {"alpha": 0.01, "p": 1.0, "sigma_s": 0.01, "material": "Al"},  # as published, mirrors gain .4 %
+        "tails": {"alpha": 0.04, "p": 0.3, "b": 4.0},
+        "flat": {"alpha": 0.08, "p": 3.0, "b": 0.4, "sigma_s": 0.03, "masking": "height"},
+        "rough": {"alpha": 0.3, "p": 1.0, "c": 1.5, "masking": "separable"},
+        "conserving": {"energy": "conserving", "sigma_s": 0.08, "b": 0.6, "material": "Al"},
+        "anisotropic": {"alpha_u": 0.2, "alpha_v": 0.05, "material": "Al"},
+        "textured": {"sigma_s": {"type": "checkerboard", "color0": 0.0, "color1": 0.05}},
+    },
     "vgroove": {
         "default": {},
         "gold": {"material": "Au", "alpha": 0.5},
@@ -97,7 +108,7 @@ SPREAD = {
 }
 
 QUICK = {"micrograin-gold", "vgroove-gold", "merillou-tiles", "deon-dense", "orennayar-default"}
-QUICK |= {"lambertsphere-default", "chandrasekhar-default", "interfacedlambertian-default"}
+QUICK |= {"lambertsphere-default", "chandrasekhar-default", "interfacedlambertian-default", "twoscale-gold"}
 CASES = [
     pytest.param(model, case, id=name, marks=[] if name in QUICK else [pytest.mark.slow])
     for model, cases in SPREAD.items()

@@ -11,7 +11,7 @@ from asperity.models import MODELS
 WAVELENGTHS = [450.0, 500, 550, 640]
 SPECTRUM = {"type": "irregular", "wavelengths": "400, 500, 600, 700", "values": "0.2, 0.8, 0.4, 0.6"}
 AT = np.interp(WAVELENGTHS, [400, 500, 600, 700], [0.2, 0.8, 0.4, 0.6])
-METALS = {"micrograin": {}, "vgroove": {"max_bounces": 1}, "deon": {}, "merillou": {}}
+METALS = {"micrograin": {}, "vgroove": {"max_bounces": 1}, "deon": {}, "merillou": {}, "twoscale": {"sigma_s": 0.0}}
 COLOURS = {
     "diffuse": ({"type": "micrograin", "specular": False}, "diffuse_reflectance"),
     "coated": ({"type": "micrograin", "int_ior": 1.5}, "diffuse_reflectance"),
@@ -35,6 +35,7 @@ COLOURS = {
     "interfacedlambertian": ({"type": "interfacedlambertian"}, "diffuse_reflectance"),
     "cavities": ({"type": "interfacedlambertian", "scattering": "multiple"}, "diffuse_reflectance"),
     "orennayar": ({"type": "orennayar"}, "reflectance"),
+    "twoscale": ({"type": "twoscale", "sigma_s": 0.0}, "reflectivity"),  # what is diffracted differs by wavelength
 }
 
 

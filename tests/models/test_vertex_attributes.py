@@ -39,6 +39,7 @@ CASES = {
     "metal": ('{"type": "vgroove", "alpha": 1.0, "reflectivity": %s}', [0.9, 0.6, 0.3], "vertex_c"),
     "albedo": ('{"type": "lambertsphere", "albedo": %s}', [0.9, 0.6, 0.3], "vertex_c"),
     "interfaced": ('{"type": "interfacedlambertian", "alpha": %s, "approximate": True}', 0.4, "vertex_a"),
+    "sigma_s": ('{"type": "twoscale", "sigma_s": %s}', 0.05, "vertex_a"),
     "sigma": ('{"type": "orennayar", "sigma": %s}', 40.0, "vertex_a"),
 }
 

@@ -1,4 +1,4 @@
-"""Distributions of microfacet normals, all written by roughness: GGX, Beckmann, Phong and Gaussian, with anisotropy.
+"""Distributions of microfacet normals, all written by roughness: GGX, Beckmann, Phong, Gaussian and EPD; anisotropic.
 
 D(m) is per steradian, int D(m) m_z dm = 1 over the hemisphere. At azimuth phi each is D(m) = scale D_iso(a; alpha_phi),
 where a is the tilt of the normal m from the surface's,
@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import drjit as dr
 
 from . import ggx
+from .epd import Power
 from .numerics import TINY, heading, normalised, one_minus_exp
 from .quadrature import integrate
 from .sampling import direction
@@ -260,6 +261,28 @@ class Gaussian(Distribution):
 
         (seen,) = integrate(ring, 16, (self, *ggx.inclination(w)), w.z)
         return dr.maximum(seen / w.z - 1, 0)
+
+
+@dataclass
+class EPD(Distribution):
+    """The exponential power distribution (Holzschuch and Pacanowski 2017): Beckmann's if p = 1, for any alpha > 0.
+
+    D_iso = p exp(-(tan^2 a / alpha^2)^p) / (pi alpha^2 Gamma(1/p) cos^4 a).
+    """
+
+    power: Power  # what depends on p
+
+    def tilt_density(self, alpha: Any, sin: Any, cos: Any) -> Any:
+        """D_iso at the tilt with this sine and cosine."""
+        return self.power.profile.density_of_tilts(alpha, sin, cos)
+
+    def sample_tilt(self, alpha: Any, u: Any) -> tuple[Any, Any]:
+        """Squares of slopes to the power of p are gamma variates; from a table."""
+        return normalised(alpha * dr.sqrt(self.power.sample(u)), 1)
+
+    def smith_lambda(self, w: Any) -> Any:
+        """Lambda(w), from a table."""
+        return self.power.smith_lambda(*ggx.inclination(direction(self.alpha_u * w.x, self.alpha_v * w.y, w.z)))
 
 
 DISTRIBUTIONS: dict[str, type[Distribution]] = {"ggx": GGX, "beckmann": Beckmann, "phong": Phong}

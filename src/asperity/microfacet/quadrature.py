@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +82,40 @@ def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, 
         return tuple(weight * value for value in f(dr.gather(Float, nodes, index), captured))
 
     return accumulate(term, dr.uint32_array_t(Float)(n), start, captured)
+
+
+@dataclass
+class Lanes:
+    """All Gauss nodes of [0, 1] for all lanes of ``like``, side by side; of several ``parts`` of an integral, perhaps.
+
+    Instead of a loop: for tables, of which there are few lanes, or a loop already.
+    """
+
+    like: Any
+    nodes: int
+    parts: int = 1
+
+    def __post_init__(self) -> None:
+        Float, self.width = type(self.like), dr.width(self.like)
+        self.node, self.weight = (
+            dr.tile(Float(values), self.width * self.parts) for values in gauss_legendre(self.nodes)
+        )
+
+    def repeat(self, x: Any) -> Any:
+        """The numbers of all lanes, for each node."""
+        return dr.repeat(x, self.nodes * self.parts)
+
+    def pick(self, options: Any) -> Any:
+        """What belongs to the part."""
+        index = dr.arange(dr.uint32_array_t(type(self.like)), self.width * self.parts * self.nodes)
+        part, found = index // self.nodes % self.parts, options[0]
+        for n, option in enumerate(options[1:], 1):
+            found = dr.select(part == n, option, found)
+        return found
+
+    def sum(self, values: Any) -> Any:
+        """Integral of what has these values at the nodes."""
+        return dr.block_sum(values * self.weight, self.nodes * self.parts)
 
 
 def over_normals(

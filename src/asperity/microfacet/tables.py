@@ -80,6 +80,15 @@ class Table:
             sums = [total + weight * value for total, value in zip(sums, self._values(node))]
         return sums
 
+    def cubic(self, x: Any) -> Any:
+        """Hermite's cubic of a table along one axis, whose two channels are a value and its derivative by ``x``."""
+        (nodes,) = self.shape
+        node, t = _cell(x, nodes)
+        (left, rise), (right, fall) = self._values(node), self._values(node + 1)
+        step, one = right - left, 1 / (nodes - 1)
+        bend, twist = rise * one - step, step - fall * one
+        return left + t * (step + (1 - t) * (bend * (1 - t) + twist * t))
+
     def _values(self, node: Any) -> Any:
         """All channels at the node of this number."""
         if isinstance(self.entries, list):
@@ -108,6 +117,13 @@ class Made:
             current = tuple(float(np.asarray(constant).item()) for constant in constants)
         if current is None or current != self.constants:
             self.result, self.constants = make(*constants), current
+
+
+def native(value: Any) -> Any:
+    """A table, or an array of one number, for the active variant: in a scalar one of plain floats."""
+    if isinstance(value, Table):
+        return value.native()
+    return value if dr.is_jit_v(mi.Float) else float(dr.detach(value).numpy().item())
 
 
 def array_types(user: str) -> tuple[Any, Any]:

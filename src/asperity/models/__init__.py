@@ -10,6 +10,7 @@ from .interfacedlambertian import InterfacedLambertian
 from .lambertsphere import Chandrasekhar, LambertSphere, LambertSpherePhase
 from .micrograin import Micrograin
 from .textures import Settled
+from .twoscale import TwoScale
 from .vgroove import VGroove
 
 MODELS: dict[str, Any] = {
@@ -21,6 +22,7 @@ MODELS: dict[str, Any] = {
     "chandrasekhar": Chandrasekhar,
     "orennayar": OrenNayar,
     "interfacedlambertian": InterfacedLambertian,
+    "twoscale": TwoScale,
 }
 """BSDF plugins by the name that a scene uses."""
 
