@@ -24,10 +24,8 @@ def test_curves_and_that_other_facets_fail(monkeypatch, wrong):
     monkeypatch.setattr(paper, "INDICES", (1.3,))
     monkeypatch.setattr(paper, "ROUGHNESSES", (0.3,))
     if wrong:
-        right = paper.UnmirroredCavities
-        monkeypatch.setattr(
-            paper, "UnmirroredCavities", lambda kind, u, v, *others: right(kind, 1.1 * u, 1.1 * v, *others)
-        )
+        right, name = paper.UnmirroredCavities, "UnmirroredCavities"
+        monkeypatch.setattr(paper, name, lambda kind, u, v, *others: right(kind, 1.1 * u, 1.1 * v, *others))
     section = paper.curves(QUICK)
     assert report.passed([section]) is (wrong is None), section.findings
 
