@@ -1,9 +1,10 @@
-"""Variance times time of ways to sample a model: `python benchmarks/noise.py [--plastic]`.
+"""Variance times time of ways to sample a model: `python benchmarks/noise.py [--plastic | --diffracting]`.
 
 Relative variance of the albedo, times the seconds of a *preview* frame with that sampler at the same parameters. Of the
 mirror grains, against sampling the NDF (Lucas 2024, Eq. 13 to 15). With ``--plastic``, of interfaced facets, against
 the published scheme (Meneveaux et al. 2018, Sec. 4.1) and against Mitsuba's `roughplastic`, whose albedo is another.
-Products below 1 are better.
+Products below 1 are better. With ``--diffracting``, deviations of `twoscale`: of its mixture, of visible normals alone,
+and of the cosine.
 """
 
 from __future__ import annotations
@@ -34,19 +35,26 @@ SAMPLERS = {"NDF": "micrograin_ndf", "GGX visible": "micrograin_ggx", "exact": "
 PLASTICS = {"ours": "interfacedlambertian", "published": "interfacedlambertian_published"}
 MASKINGS = {"Smith": {}, "V-cavities": {"masking": "vcavity"}}
 ALPHAS, BODIES, VIEWS = (0.1, 0.3, 0.6, 1.0), (1.0, 0.5), (10, 60, 85)
+TWO_SCALES = ((0.1, 0.7, 0.05, 1.2), (0.3, 1.0, 0.08, 0.5), (0.05, 3.0, 0.05, 2.0), (0.1, 1.0, 0.05, 20.0))
+"""alpha, p, sigma_s and b."""
 N = 1 << 21
 
 
-def relative_variance(bsdf: mi.BSDF, theta: float) -> float:
-    rng = mi.PCG32(size=N)
-    theta = np.radians(theta)
+def incident(theta: float) -> tuple[mi.SurfaceInteraction3f, mi.Float, mi.Point2f]:
+    """Light at this angle, and random numbers."""
+    rng, theta = mi.PCG32(size=N), np.radians(theta)
     si = dr.zeros(mi.SurfaceInteraction3f, N)
     si.wi = mi.Vector3f(float(np.sin(theta) * np.cos(0.3)), float(np.sin(theta) * np.sin(0.3)), float(np.cos(theta)))
-    _, weight = bsdf.sample(
-        mi.BSDFContext(), si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-    )
-    weight = np.asarray(weight.x, dtype=float)
+    return si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+
+
+def variance_of(weight: mi.Float) -> float:
+    weight = np.asarray(weight, dtype=float)
     return weight.var() / weight.mean() ** 2
+
+
+def relative_variance(bsdf: mi.BSDF, theta: float) -> float:
+    return variance_of(bsdf.sample(mi.BSDFContext(), *incident(theta))[1].x)
 
 
 def frame_seconds(materials: dict) -> dict:
@@ -103,13 +111,30 @@ def plastic() -> Table:
     return table
 
 
+def diffracting() -> Table:
+    table = Table("alpha, p, sigma_s, b", "degrees", "mixture", "visible normals", "cosine")
+    for alpha, p, sigma_s, b in TWO_SCALES:
+        bsdf = mi.load_dict({"type": "twoscale", "alpha": alpha, "p": p, "sigma_s": sigma_s, "b": b})
+        for theta in VIEWS:
+            si, u, v = incident(theta)
+            mirrored = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), 0)
+            facet, cosine = bsdf.sample(mirrored, si, u, v)[0], mi.warp.square_to_cosine_hemisphere(v)
+            whole = [bsdf.eval(mi.BSDFContext(), si, wo).x for wo in (facet.wo, cosine)]
+            alone = dr.select(facet.pdf > 0, whole[0] / facet.pdf, 0), whole[1] * dr.pi / cosine.z
+            found = relative_variance(bsdf, theta), *map(variance_of, alone)
+            table.add_row(f"{alpha}, {p}, {sigma_s}, {b}", str(theta), *(f"{v**0.5:.2g}" for v in found))
+    return table
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--plastic", action="store_true", help="interfaced ones, against `roughplastic`")
+    parser.add_argument("--diffracting", action="store_true", help="`twoscale`")
     mi.set_variant("llvm_ad_rgb")
     mi.set_log_level(mi.LogLevel.Error)
     register()
-    Console(width=130).print(plastic() if parser.parse_args().plastic else grains())
+    asked = parser.parse_args()
+    Console(width=130).print(plastic() if asked.plastic else diffracting() if asked.diffracting else grains())
 
 
 if __name__ == "__main__":

@@ -62,6 +62,14 @@ PLASTIC = {
     },
     "interfacedlambertian, approximate": {**FACETS, "approximate": True},
 }
+TWO_SCALES = {"type": "twoscale", "material": "Au", "alpha": 0.1, "p": 0.7}
+DIFFRACTING = {
+    # of equal rms slope: alpha sqrt(Gamma(2 / p) / Gamma(1 / p))
+    "roughconductor, Beckmann": {"type": "roughconductor", "material": "Au", "alpha": 0.142},
+    "twoscale": TWO_SCALES,
+    "twoscale, conserving": {**TWO_SCALES, "energy": "conserving"},
+    "twoscale, anisotropic": {"type": "twoscale", "material": "Au", "p": 0.7, "alpha_u": 0.14, "alpha_v": 0.07},
+}
 LANES = 1 << 21
 
 
@@ -169,10 +177,12 @@ def main() -> None:
     parser.add_argument("--only", help="part of a material's name")
     parser.add_argument("--matte", action="store_true", help="matte materials, against `diffuse`")
     parser.add_argument("--plastic", action="store_true", help="interfaced ones, against `roughplastic`")
+    parser.add_argument("--diffracting", action="store_true", help="`twoscale`, against facets of equal rms slope")
     quick, only = (args := parser.parse_args()).quick, args.only
-    if args.matte or args.plastic:
-        MATERIALS.clear()
-        MATERIALS.update(MATTE if args.matte else PLASTIC)
+    for asked, materials in ((args.matte, MATTE), (args.plastic, PLASTIC), (args.diffracting, DIFFRACTING)):
+        if asked:
+            MATERIALS.clear()
+            MATERIALS.update(materials)
     reference = next(iter(MATERIALS))
     mi.set_variant("llvm_ad_rgb")
     mi.set_log_level(mi.LogLevel.Error)
