@@ -79,8 +79,8 @@ def far_field(heights: np.ndarray, wavenumber: float) -> np.ndarray:
     outgoing direction, only orders of that cos_o are right.
     """
     phase = (heights * wavenumber).astype(np.float32)
-    waves = fft.fft2(np.exp(1j * phase)) / heights.size
-    return np.square(np.abs(waves))
+    waves = fft.fft2(np.cos(phase) + 1j * np.sin(phase)) / heights.size
+    return waves.real**2 + waves.imag**2
 
 
 @dataclass(frozen=True)
@@ -148,13 +148,35 @@ class Facets:
         return (1 + scale**2 * cross) ** (-(self.c + 1) / 2)
 
     def propagating(self, sin: float, wavelength: float) -> float:
-        """R, by the disc of directions: share of the power spectrum that turns light of this sine of incidence there."""
+        """R: share of the power spectrum that turns light of this sine of incidence into the disc of directions."""
+        *_, spectrum = self._disc(sin, wavelength)
+        return float(spectrum.sum())
+
+    def smooth_albedo(self, sin: float, wavelength: float) -> tuple[float, float]:
+        """What a smooth mirror with the finer roughness keeps in the mirror direction, and what it diffracts."""
+        x, y, cos_o, spectrum = self._disc(sin, wavelength)
+        cos_i = np.sqrt(1 - sin * sin)
+        cos2 = ((x - sin) ** 2 + y**2 + (cos_i + cos_o) ** 2) / 4
+        grid = np.linspace(0, 1, 129)
+        R = np.interp(np.sqrt(np.maximum(1 - cos2, 0)), grid, [self.propagating(s, wavelength) for s in grid])
+        k2 = (4 * np.pi * self.sigma_s / wavelength) ** 2
+        facing = (cos_i + cos_o) ** 2 / 4 / cos2
+        kept = np.exp(-k2 * cos_i**2 * self.propagating(sin, wavelength))
+        return float(kept), float(np.sum(spectrum * facing * -np.expm1(-k2 * cos2 * R) / R))
+
+    def _disc(self, sin: float, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Nodes in half the disc of directions: (x, y, cosine, power spectrum by area), of light mirrored to (sin, 0).
+
+        Weights are in the spectrum, those of the other half too.
+        """
         B = self.b / wavelength
-        radius, weight = panels(0, 1, ((min(sin, 1), 0.1 / B),))
+        t, weight = panels(0, 1, ((np.sqrt(max(1 - sin, 0)), 0.1 / B), (0, 0.1)))
+        radius = 1 - t * t  # the cosine has a root at the rim
         phi, around = panels(0, np.pi, ((0, 0.1 / B / max(sin, 0.1)),))
-        square = (radius * np.cos(phi[:, None]) - sin) ** 2 + (radius * np.sin(phi[:, None])) ** 2
-        spectrum = B**2 * (self.c - 1) / np.pi * (1 + B**2 * square) ** (-(self.c + 1) / 2)
-        return float(around @ spectrum @ (radius * weight))
+        x, y = np.outer(np.cos(phi), radius), np.outer(np.sin(phi), radius)
+        shape = (1 + B**2 * ((x - sin) ** 2 + y**2)) ** (-(self.c + 1) / 2)
+        spectrum = B**2 * (self.c - 1) / np.pi * shape * np.outer(around, weight * 2 * t * radius)
+        return x, y, np.broadcast_to(np.sqrt(1 - radius**2), x.shape), spectrum
 
     def smith_lambda(self, w: np.ndarray) -> float:
         """Smith's Lambda: projected area of facets turned away from ``w``, by the cosine of w."""
