@@ -9,7 +9,7 @@ from asperity.errors import ParameterError
 from asperity.lab import evaluate
 from asperity.models import MODELS
 from asperity.models.micrograin import Micrograin
-from asperity.parameters import Axes, Choice, Constant, Declared, Texture, Usual
+from asperity.parameters import Axes, Choice, Constant, ConstantAxes, Declared, Texture, Usual
 
 
 def bitmap(low, high):
@@ -275,6 +275,24 @@ def test_a_constant_has_derivatives_and_does_not_vary(rgb):
         parsed(size=mi.load_dict({"type": "checkerboard", "color0": 0.2, "color1": 0.3}))
     with pytest.raises(ParameterError, match=r"size = 2.0: expected a number in \[0.1, 1\]"):
         parsed(size=2.0)
+
+
+def test_axes_that_do_not_vary(rgb):
+    class Brushed(Declared):
+        alpha = ConstantAxes("roughness", 0.3, low=0.01, high=1)
+
+    model = parsed(Brushed, alpha_u=0.1)
+    assert [float(x[0]) for x in model.at("alpha", dr.zeros(mi.SurfaceInteraction3f), True)] == pytest.approx(
+        [0.1, 0.3]
+    )
+    assert {row.kind for row in Brushed.rows()} == {"number"}
+    for given, complaint in (
+        (2.0, r" = 2.0: expected a number in \[0.01, 1\]"),
+        ("checkerboard", ": a texture, where one"),
+    ):
+        value = mi.load_dict({"type": given, "color0": 0.2, "color1": 0.3}) if given == "checkerboard" else given
+        with pytest.raises(ParameterError, match="alpha_v" + complaint):
+            parsed(Brushed, alpha_v=value)
 
 
 def test_a_metal_is_its_reflectance(rgb):

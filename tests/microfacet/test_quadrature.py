@@ -10,7 +10,7 @@ from helpers import directions
 
 from asperity.microfacet.distributions import DISTRIBUTIONS, GGX, Beckmann
 from asperity.microfacet.masking import cavity_visible, cavity_visible_and_lit
-from asperity.microfacet.quadrature import RULES, accumulate, gauss_legendre, integrate, over_normals
+from asperity.microfacet.quadrature import RULES, Lanes, accumulate, gauss_legendre, integrate, over_normals
 
 
 @dataclass
@@ -28,6 +28,17 @@ class Power:
 def test_integrate_is_exact_for_polynomials(like, nested):
     found = integrate(lambda x, power: (x * power(x), 0 * x + 2), 4, Power(3 * like), like, nested)
     assert [np.asarray(value).item() for value in found] == pytest.approx([0.75, 2], rel=1e-6)
+
+
+def test_nodes_side_by_side():
+    """int a x^2 dx + int 3 a x dx, in two parts, for three numbers at once; with derivatives."""
+    a = llvm.Float64(1, 2, 3)
+    dr.enable_grad(a)
+    lanes = Lanes(a, 4, 2)
+    found = lanes.sum(lanes.repeat(a) * lanes.pick([lanes.node, 3]) * lanes.node)
+    np.testing.assert_allclose(found, np.array([1, 2, 3]) * (1 / 3 + 3 / 2))
+    dr.backward(found)
+    np.testing.assert_allclose(dr.grad(a), 1 / 3 + 3 / 2)
 
 
 @pytest.mark.parametrize("nested", [False, True], ids=["loop", "copies"])

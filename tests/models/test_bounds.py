@@ -74,7 +74,7 @@ CONSTANT = {
     "twoscale": {"alpha", "alpha_u", "alpha_v", "p", "b", "c"},
 }
 """What does not vary over the surface, in the first two if light scatters several times."""
-SLOW = {"stretched", "coated", "non-symmetric", "non-symmetric beckmann", "non-symmetric phong"}
+SLOW = {"conserving", "stretched", "coated", "non-symmetric", "non-symmetric beckmann", "non-symmetric phong"}
 CASES = [
     pytest.param(model, case, id=f"{model}-{case}", marks=[pytest.mark.slow] if case in SLOW else [])
     for model, cases in USED.items()

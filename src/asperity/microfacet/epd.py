@@ -21,6 +21,8 @@ NODES = 64
 """Of either table: G1 is good to 8e-4, the density of draws to 1e-4."""
 RULE = 32
 """Nodes of the integral that is Lambda: 1e-6."""
+NEWTON, TERMS = 12, 120
+"""Steps of the inversion by which draws are tabulated, and terms of the series of the incomplete gamma function."""
 FIRST, LAST = math.log(1e-7), math.log(17)
 """Logarithms of v = -log(1 - u), between which draws are tabulated: all but one in 10^7 of them."""
 
@@ -120,10 +122,6 @@ def squares_table(p: Any) -> Table:
         log_x = log_x + (log_v - dr.log(v)) * slope
     _, slope = exceedance(p, log_gamma, log_x)
     return Table.of([NODES], [Float(log_x), Float(slope * (LAST - FIRST))])
-
-
-NEWTON, TERMS = 12, 120
-"""Steps, and terms of the series of the incomplete gamma function."""
 
 
 def exceedance(p: Any, log_gamma: Any, log_x: Any) -> tuple[Any, Any]:

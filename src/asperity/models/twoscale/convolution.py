@@ -65,15 +65,15 @@ def stretched_convolution(
 
 
 def nearby(u: Any, sin: Any) -> Any:
-    """Azimuth from h up to which S is large."""
-    return dr.clip(0.5 / (u * dr.maximum(sin, 1e-6)), 1e-3, 2)
+    """Azimuth from h up to which S is large; as all that nodes depend on, without derivatives."""
+    return dr.clip(0.5 / dr.detach(u * dr.maximum(sin, 1e-6)), 1e-3, 2)
 
 
 def along_meridian(
     profile: Profile, alpha: Any, c: Any, u: Any, sin: Any, cos: Any, sin_phi: Any, cos_phi: Any, nodes: int
 ) -> Any:
     """Integral of S D over the normals m at one azimuth."""
-    parts = tilt_parts(dr.detach(profile.p), dr.detach(alpha), u, sin, cos, sin_phi, cos_phi)
+    parts = tilt_parts(*map(dr.detach, (profile.p, alpha, u, sin, cos, sin_phi, cos_phi)))
     meridian = Meridian(profile, alpha, c, u, sin, cos, sin_phi, cos_phi, parts)
     return integrate(lambda t, meridian: (meridian(t),), nodes, meridian, u)[0]
 

@@ -112,7 +112,10 @@ class ByWavelength:
 
 @dataclass
 class Layout:
-    """Where nodes are of a function of u, up to ``highest``, and of the tilt of h; neither carries derivatives."""
+    """Where nodes are of a function of u, up to ``highest``, and of the tilt of h.
+
+    They move with the parameters and carry derivatives, which are then those of the table as it is, errors included.
+    """
 
     highest: Any
     near: Any  # how near to the normal, and to the horizon, nodes become dense: in tangents of half the tilt
@@ -166,22 +169,21 @@ class Convolved:
     def of(cls, profile: Profile, alpha: Sequence[Any], b: Any, c: Any, bands: Bands) -> Convolved:
         """For one roughness or two."""
         Float, larger, smaller = type(b), dr.maximum(alpha[0], alpha[-1]), dr.minimum(alpha[0], alpha[-1])
-        variance = dr.detach(profile.variance())
-        flat = tuple(dr.minimum(dr.square(dr.detach(one)) * variance, 0.3) / 4 for one in (smaller, larger))
-        layout = Layout.of(dr.detach(smaller), dr.detach(b) / bands.shortest, flat[0])
+        across, along = (dr.minimum(dr.square(one) * profile.variance(), 0.3) / 4 for one in (smaller, larger))
+        layout = Layout.of(smaller, b / bands.shortest, across)
         axes, ratios = (EVEN, bands.ratios) if len(alpha) == 1 else (STRETCHED, [1.0])
-        *along, frequency, tilt = (dr.repeat(x, len(ratios)) for x in grid(Float, axes))
+        *azimuth, frequency, tilt = (dr.repeat(x, len(ratios)) for x in grid(Float, axes))
         (sin, cos), u = layout.tilt(tilt), layout.u(frequency) * dr.tile(Float(ratios), prod(axes))
-        if along:
-            turn = dr.acos(dr.sqrt(along[0]))
+        if azimuth:
+            turn = dr.acos(dr.sqrt(azimuth[0]))
             V = stretched_convolution(profile, (larger, smaller), c, u, sin, cos, turn)
         else:
             V = convolution(profile, larger, c, u, sin, cos)
-        found, UInt = dr.log(V / like(c, u, sin, cos, between(flat, along))), dr.uint32_array_t(Float)
+        found, UInt = dr.log(V / like(c, u, sin, cos, between((across, along), azimuth))), dr.uint32_array_t(Float)
         nodes = len(ratios) * dr.arange(UInt, prod(axes))
         table = packed(axes, [dr.gather(Float, found, nodes + n) for n in range(len(ratios))])
         turned = dr.select(dr.detach(alpha[0] >= alpha[-1]), Float(0), Float(1))
-        return cls(table, layout, ratios, flat, turned)
+        return cls(table, layout, ratios, (across, along), turned)
 
     def native(self) -> Convolved:
         """The same for the active variant."""
