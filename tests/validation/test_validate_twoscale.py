@@ -26,7 +26,7 @@ FEW = {0.0: (0.01,), 60.0: (0.02,)}
 )
 def test_section(section):
     found = section(QUICK)
-    assert found.findings and all(finding.passed for finding in found.findings), found.findings
+    assert found.findings and all(finding.passed is True for finding in found.findings), found.findings
     assert mi.variant() == "llvm_ad_rgb"
 
 

@@ -256,7 +256,9 @@ def facet_by_facet(effort: Effort) -> Section:
                 if facets.alpha <= SMALL:
                     bound = known[1] * PERCENTILE
                     findings.append(
-                        Finding(f"{name}: close to the integral", f"{found[1]:.1%}", f"{bound:.1%}", found[1] <= bound)
+                        Finding(
+                            f"{name}: close to the integral", f"{found[1]:.1%}", f"{bound:.1%}", bool(found[1] <= bound)
+                        )
                     )
                 i, o = i[: count // 4], o[: count // 4]
                 own = [facets.diffracted(*pair, GREEN, own=True)[1] for pair in zip(i, o)]
