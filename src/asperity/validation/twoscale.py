@@ -147,9 +147,9 @@ def heights(effort: Effort) -> Section:
         f"{WAVES} wavelengths. Each delays a scalar wave by its heights; a Fourier transform adds up the rest, which "
         "are compared in rings around the normal, for oblique light in parts of them. The model's lobe is of first "
         "order in the heights. What is diffracted twice would be spread once more: that is at most 1 - exp(-(4πσ/λ)²) "
-        f"of it, which claims allow, up to σ/λ {CLAIMED:g}. A is compared at normal incidence: of oblique light, other "
-        "heights turn it to real directions forth than back, but a surface has either. Least and largest have the "
-        "noise of the surfaces.",
+        f"of it, which claims allow, up to σ/λ {CLAIMED:g}. A is compared at normal incidence: of oblique light, waves "
+        "of the surface along it turn more than waves against it to real directions, but surfaces have both alike. "
+        "Least and largest have the noise of the surfaces.",
         findings,
         [Table(("σ/λ", "θi", "A", "A of the waves", "lobe / waves - 1, median", "least", "largest"), rows)],
         {"heights": lobes_of_heights(lines)},
