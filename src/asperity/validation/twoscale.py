@@ -476,7 +476,7 @@ def wavelengths(effort: Effort) -> Section:
         "farther off, f cos θo. Then spheres with σ 0.04 µm in white light (D65) from one direction: in RGB; by "
         f"{SAMPLES} wavelengths of {ENDS[0]:g} to {ENDS[1]:g} nm, each with its own index; and five times the "
         "difference. Errors are root mean squares of the three colours, by the luminance. The mirror's are those of "
-        "the three wavelengths; a metal's are its index's too, which RGB has three of.",
+        "the three wavelengths; a metal's are those of its index too, of which RGB has three values.",
         findings,
         [
             Table(("wavelength", "A at 0°", "haze, 5° off", "15°", "30°", "60°"), rows),
