@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import UnknownNameError
-from . import interfacedlambertian, lambertsphere, micrograin, vgroove
+from . import interfacedlambertian, lambertsphere, micrograin, twoscale, vgroove
 from .report import FULL, QUICK, Effort, Report, Section
 
 PAPERS: dict[str, Callable[[Effort], Iterator[Section]]] = {
@@ -16,6 +16,7 @@ PAPERS: dict[str, Callable[[Effort], Iterator[Section]]] = {
     "vgroove": vgroove.sections,
     "lambertsphere": lambertsphere.sections,
     "interfacedlambertian": interfacedlambertian.sections,
+    "twoscale": twoscale.sections,
 }
 """What makes the sections of a model's report, by the model's name."""
 

@@ -35,7 +35,7 @@ CASES = [(0.05, 1.2, 2.3, 0.55), (0.01, 0.3, 1.5, 0.45), (0.1, 3.0, 2.8, 0.65), 
 @pytest.mark.parametrize("sigma, b, c, wavelength", CASES)
 @pytest.mark.parametrize("cos", [1.0, 0.8, 0.3, 0.05])
 def test_what_smooth_facets_diffract(sigma, b, c, wavelength, cos):
-    """24 by 16 nodes, of which a kink where circles leave the disc leaves 2e-3."""
+    """By 32 circles, half of which leave the disc: 1e-4; and R of the reference, linear between 2000 nodes."""
     B, k, sin = b / wavelength, 4 * np.pi * sigma / wavelength, np.sqrt(1 - cos * cos)
     grid = np.linspace(0, 1, 2001)
     R = np.array(diffraction.propagating(float64(np.sqrt(1 - grid**2)), float64(B), float64(c)))
@@ -46,7 +46,7 @@ def test_what_smooth_facets_diffract(sigma, b, c, wavelength, cos):
         return (1 - dr.exp(-k * k * dr.square(cos_d) * fraction)) / fraction
 
     found = diffraction.smooth_albedo(share, float64(sin), float64(cos), float64(B), float64(c))[0]
-    assert found == pytest.approx(expected, rel=2e-3)
+    assert found == pytest.approx(expected, rel=3e-4)
 
 
 def test_a_smooth_facet_and_what_it_diffracts():

@@ -93,17 +93,20 @@ class Disc:
 
 
 def smooth_albedo(
-    share: Callable, sin: Any, cos: Any, B: Any, c: Any, others: Sequence[Any] = (), rule: tuple[int, int] = (24, 16)
+    share: Callable, sin: Any, cos: Any, B: Any, c: Any, others: Sequence[Any] = (), rule: tuple[int, int] = (16, 16)
 ) -> Any:
     """T: what a smooth facet diffracts of the light from this inclination, without Fresnel's term.
 
     ``share(cos_d, *others)`` is (1 - A) / R. Nodes are where the power spectrum is, around the mirror direction.
     """
-    radii = Lanes(sin, rule[0])
+    radii = Lanes(sin, rule[0], 2)
     sin, cos, B, *others = (radii.repeat(x) for x in (sin, cos, B, *others))
     disc = Disc(sin, dr.detach(B), dr.detach(c))
-    r = disc.radius(radii.node)
+    whole = within(disc.B * (1 - sin), disc.c) / disc.total()  # share whose circles are within the disc
+    t, beyond = radii.node, 1 - whole  # the azimuths of other circles have roots at both ends
+    r = disc.radius(radii.pick([whole * t, whole + beyond * t * t * (3 - 2 * t)]))
     drawn = scale(B, c, 1) * spread(dr.square(B * r), c) / disc.density(r)
+    drawn = drawn * radii.pick([whole, beyond * 6 * t * (1 - t)])
     lanes = Lanes(r, rule[1])
     reach, drawn, r, sin, cos, *others = (lanes.repeat(x) for x in (disc.reach(r), drawn, r, sin, cos, *others))
     sin_psi, cos_psi = dr.sincos(lanes.node * reach)
