@@ -102,7 +102,7 @@ def told_apart(claim: str, ours: Finding, rival: Finding) -> Finding:
 
 def passed(sections: Iterable[Section]) -> bool:
     """Whether no finding failed."""
-    return all(finding.passed is not False for section in sections for finding in section.findings)
+    return all(finding.passed is None or finding.passed for section in sections for finding in section.findings)
 
 
 class Report:
