@@ -52,3 +52,12 @@ def test_report(tmp_path):
     text = path.read_text()
     assert "| claim | 1.0 | 0.5 | **failed** |" in text and "| 1 | 0.1235 |" in text and "![f](f.png)" in text
     assert (tmp_path / "f.png").stat().st_size > 1000 and not report.passed([section])
+
+
+@pytest.mark.parametrize(
+    "verdict, expected", [(True, True), (None, True), (False, False), (np.True_, True), (np.False_, False)]
+)
+def test_one_failed_claim_fails_the_report(verdict, expected):
+    """A verdict of NumPy's is no bool, and `is not False`."""
+    sections = [report.Section("", "", [report.Finding("", "", "", True), report.Finding("", "", "", verdict)])]
+    assert report.passed(sections) == expected
