@@ -586,3 +586,13 @@ def numbers(texture: Any, differentiated: bool = False) -> Iterable[tuple[str, n
         texels = isinstance(data, mi.TensorXf) and found.ndim == 3 and found.shape[-1] == 3
         if not (mi.is_spectral and (texels or isinstance(data, mi.Color3f))):
             yield key, found
+
+
+def all_shown(texture: Any) -> bool:
+    """Whether `numbers` are all that a texture is made of: attributes of meshes are not, nor spectral colours."""
+    if isinstance(ours := getattr(texture, "model", None), Declared):
+        return all(all_shown(getattr(ours, name)) for name in ours.between)
+    tree = mi.traverse(texture)
+    shown = {tree.properties[key][2] for key, _ in numbers(texture, differentiated=True)}
+    parents = {parent for parent, _ in tree.hierarchy.values()}
+    return all(node in shown for node in tree.hierarchy if node not in parents)

@@ -377,7 +377,7 @@ class More:
 
         energy = over_normals(of_cavity, distribution, upright, (n, white, shade, even), 32, 4)[0]
         whole = dr.gather(Float, energy, UInt(SHADES - 1))
-        return Table.of((SHADES,), [energy / dr.maximum(whole, TINY)])
+        return Table.of((SHADES,), [dr.maximum(energy, 0) / dr.maximum(whole, TINY)])
 
     def native(self) -> More:
         """The same for the active variant."""

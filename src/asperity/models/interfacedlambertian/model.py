@@ -13,7 +13,7 @@ from ...lobes import Lifted, Lobe, LobeModel, diffuse, glossy
 from ...microfacet.distributions import Gaussian
 from ...microfacet.numerics import clamp
 from ...microfacet.tables import Made
-from ...parameters import Axes, Choice, Colour, Flag, Ior, Usual, constant, numbers, varies
+from ...parameters import Axes, Choice, Colour, Flag, Ior, Usual, all_shown, constant, numbers, varies
 from .body import body_albedo
 from .facets import DISTRIBUTIONS, FACETS
 from .interreflection import CavityMirrors
@@ -69,7 +69,7 @@ class InterfacedLambertian(LobeModel):
         "how often light meets facets at most: once, twice, or as often as it takes, in V-cavities",
         options=("single", "double", "multiple"),
     )
-    approximate = Flag("whether a coarse rule sums over the facets, with errors of 1 %, instead of a table", False)
+    approximate = Flag("whether a coarse rule sums over the facets, with errors of 3 %, instead of a table", False)
 
     def configure(self, given: set[str]) -> None:
         """Settle the masking, and complain of what does not go together."""
@@ -103,30 +103,40 @@ class InterfacedLambertian(LobeModel):
         single, textures = self.scattering == "single", list(self.alpha.textures.items())
         if single and (varies(self.int_ior) or varies(self.ext_ior)):
             return False, []
-        n = self._relative_index(constant("int_ior", self.int_ior), constant("ext_ior", self.ext_ior))
+        why = f' by scattering = "{self.scattering}"'
+        n = self._relative_index(constant("int_ior", self.int_ior, why), constant("ext_ior", self.ext_ior, why))
         if self.scattering == "multiple" or not any(varies(texture) for _, texture in textures):
-            alphas = [self._least(type(self).alpha.clamp(constant(name, texture))) for name, texture in textures]
+            alphas = [self._least(type(self).alpha.clamp(constant(name, texture, why))) for name, texture in textures]
             tabulated = self.alpha.isotropic and not self.approximate
-            return tabulated, [n, *alphas] if tabulated or not single else []
-        shown = [found.ravel() for _, found in numbers(textures[0][1], differentiated=True)]
-        if self.approximate or not (self.alpha.isotropic and shown):
+            needed = tabulated or self.scattering == "multiple"
+            return tabulated, [n, *alphas] if needed else [] if single else [n]
+        if self.approximate or not (self.alpha.isotropic and all_shown(textures[0][1])):
             return False, [] if single else [n]
+        shown = [found.ravel() for _, found in numbers(textures[0][1], differentiated=True)]
         ends = np.clip([min(map(np.min, shown)), max(map(np.max, shown))], type(self).alpha.low, type(self).alpha.high)
         return True, [n, *steps(*map(float, ends))]
 
     def check(self) -> None:
         """Ranges, the order of the two indices, and where Smith's masking of the Gaussian ends."""
         super().check()
-        inner, outer = (self._index(name) for name in ("int_ior", "ext_ior"))
-        if inner is not None and outer is not None and inner < outer * (1 - MATCHED):
-            raise ParameterError(f"int_ior = {inner:g}: expected at least ext_ior = {outer:g}; the body is denser.")
+        inner, outer = self._indices("int_ior"), self._indices("ext_ior")
+        if inner and outer:
+            # Two textures may go together: they are wrong for sure if they are everywhere.
+            both = varies(self.int_ior) and varies(self.ext_ior)
+            least, most = (inner[1], outer[0]) if both else (inner[0], outer[1])
+            if least < most * (1 - MATCHED):
+                raise ParameterError(f"int_ior = {least:g}: expected at least ext_ior = {most:g}; the body is denser.")
         if self._ill_posed():
             self._check_smith_of_gaussian()
 
+    def _indices(self, name: str) -> list[float]:
+        """The ends of an index of refraction, as far as its texture shows them."""
+        shown = [found for _, found in numbers(getattr(self, name), True)]
+        return [float(f(list(map(f, shown)))) for f in (np.min, np.max)] if shown else []
+
     def _index(self, name: str) -> float | None:
         """An index of refraction that is the same everywhere."""
-        texture = getattr(self, name)
-        return None if varies(texture) else max((found.max() for _, found in numbers(texture, True)), default=None)
+        return None if varies(getattr(self, name)) else max(self._indices(name), default=None)
 
     def _ill_posed(self) -> bool:
         """Whether facets are steep enough to be infinitely many."""

@@ -49,7 +49,7 @@ def propagating(sin: Any, B: Any, c: Any) -> Any:
 
 
 def within(radius: Any, c: Any) -> Any:
-    """Share of the power spectrum at frequencies below ``radius`` / b, in waves per length: a two-dimensional integral."""
+    """Share of the power spectrum at frequencies below ``radius`` / b, in waves per length: an integral in 2D."""
     return one_minus_exp((c - 1) / 2 * log1p(dr.square(radius)))
 
 
