@@ -88,7 +88,7 @@ def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, 
 class Lanes:
     """All Gauss nodes of [0, 1] for all lanes of ``like``, side by side; of several ``parts`` of an integral, perhaps.
 
-    Instead of a loop: for tables, of which there are few lanes, or a loop already.
+    Instead of a loop: for tables, of which there are few lanes, or where there is a loop already.
     """
 
     like: Any
@@ -106,7 +106,7 @@ class Lanes:
         return dr.repeat(x, self.nodes * self.parts)
 
     def pick(self, options: Any) -> Any:
-        """What belongs to the part."""
+        """Of ``options``, one for each part, that of the part that a node is in."""
         index = dr.arange(dr.uint32_array_t(type(self.like)), self.width * self.parts * self.nodes)
         part, found = index // self.nodes % self.parts, options[0]
         for n, option in enumerate(options[1:], 1):

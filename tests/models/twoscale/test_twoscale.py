@@ -246,3 +246,16 @@ def test_heights_may_be_a_texture(rgb):
         si.uv = mi.Point2f(x, 0.25)
         found = np.array(bsdf.eval(mi.BSDFContext(), si, wo))
         np.testing.assert_allclose(found, helpers.values({**MODEL, "sigma_s": sigma}, wi, wo), rtol=1e-4, atol=1e-6)
+
+
+def test_what_is_stretched_too_far_is_warned_of(rgb):
+    with pytest.warns(UserWarning, match="alpha_u : alpha_v = 10 : 1: beyond 5 : 1 the haze is off"):
+        mi.load_dict({"type": "twoscale", "alpha_u": 0.3, "alpha_v": 0.03})
+
+
+def test_long_correlations_conserve_energy(rgb):
+    """Where the power spectrum is that steep, shares of it round to 1."""
+    bsdf = mi.load_dict(
+        {"type": "twoscale", "b": 30.0, "c": 5.0, "energy": "conserving", "wavelengths": [0.4, 0.2, 0.1]}
+    )
+    assert np.isfinite(np.array(bsdf.model.known.result.lost.table.entries)).all()

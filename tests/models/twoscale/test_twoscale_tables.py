@@ -46,19 +46,27 @@ def test_the_convolution(rgb):
     assert np.percentile(errors, 99) < P99 and np.max(errors) < WORST
 
 
-@pytest.mark.parametrize("alphas, p, b", [((0.2, 0.05), 1, 1.2), ((0.05, 0.1), 0.7, 1.2), ((0.06, 0.02), 0.6, 2)])
-def test_the_convolution_of_two_roughnesses(rgb, alphas, p, b):
-    """Along either axis; the table over the azimuth, too, is coarser, but ratios of 5 : 1 are as good."""
-    rng, n = np.random.default_rng(3), 500
-    theta, cos_d = references.tilts(rng, n, max(alphas)), rng.uniform(0.01, 1, n)
-    phi = rng.uniform(0, 2 * np.pi, n)
-    found, u = looked_up(alphas, p, b, 2.3, cos_d, half_vectors(theta, phi))
-    azimuth = np.arccos(np.abs(np.cos(phi) if alphas[0] > alphas[1] else np.sin(phi)))
-    numbers = (float64(np.tile(x, 3)) for x in (np.sin(theta), np.cos(theta), azimuth))
-    ends, u = (float64(max(alphas)), float64(min(alphas))), float64(u.ravel())
-    expected = convolution.stretched_convolution(Profile.of(float64(p)), ends, float64(2.3), u, *numbers)
-    errors = np.abs(found.ravel() / np.array(expected) - 1)
-    assert np.percentile(errors, 99) < P99 and np.max(errors) < WORST
+@pytest.mark.parametrize("ratio, bounds", [(2, (0.004, 0.01, 0.03)), (5, (0.007, 0.02, 0.12))])
+def test_the_convolution_of_two_roughnesses(rgb, ratio, bounds):
+    """Of six materials; 95 %, 99 % and the worst: of twenty they are .2, .6, 1.5 % (2 : 1) and .2, 1.1, 9 % (5 : 1).
+
+    Six have up to .6 % in place of .2 %: most of it is in one or two materials, of long tails.
+    """
+    errors, n = [], 200
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        alpha, p, b, c = references.material(rng)
+        ends = (alpha, alpha / ratio)
+        theta, cos_d = references.tilts(rng, n, alpha), rng.uniform(0.01, 1, n)
+        phi = rng.uniform(0, 2 * np.pi, n)
+        turned = seed % 2 == 1
+        found, u = looked_up(ends[::-1] if turned else ends, p, b, c, cos_d, half_vectors(theta, phi))
+        azimuth = np.arccos(np.abs(np.sin(phi) if turned else np.cos(phi)))
+        numbers = (float64(np.tile(x, 3)) for x in (np.sin(theta), np.cos(theta), azimuth))
+        both, u = (float64(ends[0]), float64(ends[1])), float64(u.ravel())
+        expected = convolution.stretched_convolution(Profile.of(float64(p)), both, float64(c), u, *numbers)
+        errors.append(np.abs(found.ravel() / np.array(expected) - 1))
+    assert (np.percentile(errors, [95, 99, 100]) < bounds).all()
 
 
 def known(variant, b, c, conserving=False):

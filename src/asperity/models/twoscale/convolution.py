@@ -107,7 +107,7 @@ class Meridian:
 def tilt_parts(p: Any, alpha: Any, u: Any, sin: Any, cos: Any, sin_phi: Any, cos_phi: Any) -> list[Part]:
     """Intervals of tilts along a meridian, between all that has a peak or an edge.
 
-    That are the normal, where D begins; the tilt of D's edge; the tilt nearest to h, which S is around; and the end:
+    These are the normal, where D begins; the tilt of D's edge; the tilt nearest to h, which S is around; and the end:
     the horizon, or where m turns away from h, or beyond all facets.
     """
     ahead, cos = cos_phi > 0, dr.maximum(cos, 1e-7)

@@ -18,7 +18,7 @@ from typing import Any
 
 import drjit as dr
 
-from ...microfacet.numerics import log1p, one_minus_exp
+from ...microfacet.numerics import ONE_BELOW, log1p, one_minus_exp
 from ...microfacet.quadrature import Lanes, accumulate
 
 MIDPOINTS = 256
@@ -77,7 +77,8 @@ class Disc:
 
     def radius(self, u: Any) -> Any:
         """Distance from the mirror direction, below which is a share ``u`` in [0, 1) of `total`."""
-        depth = -2 / (self.c - 1) * log1p(-u * self.total())  # log(1 + B^2 r^2)
+        share = dr.minimum(u * self.total(), ONE_BELOW)
+        depth = -2 / (self.c - 1) * log1p(-share)  # log(1 + B^2 r^2)
         return dr.sqrt(dr.exp(depth) * one_minus_exp(depth)) / self.B
 
     def reach(self, r: Any) -> Any:

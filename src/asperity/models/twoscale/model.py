@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
+import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from ...conductors import Conductor
 from ...errors import ParameterError
@@ -28,6 +31,8 @@ CITATION = """\
   year    = {2017},
   doi     = {10.1145/3072959.3073621}
 }"""
+STRETCH = 5
+"""Ratio of both roughnesses up to which the table of the convolution is good, to 1.1 % (99 % of all)."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +65,9 @@ class Wavelengths(Parameter):
 class TwoScale(LobeModel):
     """Metal of facets with a finer roughness, below the wavelength, that diffracts light around the mirror direction.
 
-    Polished, brushed or coated metals and glossy plastics whose highlights have a bright core and a wide, coloured
-    haze. The finer roughness has the rms height sigma_s and a power spectrum of the correlation length b and the
-    exponent c; facets follow the exponential power distribution, which is Beckmann's if p = 1. In spectral variants
+    Polished, brushed or coated metals, and in a blend the coat of a plastic, whose highlights have a bright core and a
+    wide, coloured haze. The finer roughness has the rms height sigma_s and a power spectrum of the correlation length b
+    and the exponent c; facets follow the exponential power distribution, which is Beckmann's if p = 1. In spectral variants
     every wavelength is diffracted as it should.
     """
 
@@ -111,7 +116,15 @@ class TwoScale(LobeModel):
         """Make the tables."""
         numbers = [self.at(name, None, True) for name in ("p", "b", "c")]
         alphas = [type(self).alpha.clamp(constant(*item)) for item in self.alpha.textures.items()]
+        self._warn_of_stretch(alphas)
         self.known.update(partial(Known.made, self.bands, self.energy == "conserving"), *numbers, *alphas)
+
+    @staticmethod
+    def _warn_of_stretch(alphas: list[Any]) -> None:
+        least, most = (f([float(np.asarray(dr.detach(alpha)).item()) for alpha in alphas]) for f in (min, max))
+        if most > STRETCH * least * 1.001:
+            ratio = f"alpha_u : alpha_v = {most / least:.3g} : 1"
+            warnings.warn(f"{ratio}: beyond {STRETCH} : 1 the haze is off by factors in places.", stacklevel=3)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Heights from a nanometre on: of what grows with their square, no derivative at 0 sees that it would."""

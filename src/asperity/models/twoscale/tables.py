@@ -25,7 +25,7 @@ COSINES, COLOURS = 64, 32
 """Nodes of R, over cos_d; and in spectral variants, over wavelengths."""
 LOST = (24, 24), 6
 """The same of what smooth facets lose, over the phase and cos_d."""
-EVEN, STRETCHED = (28, 108), (9, 24, 64)
+EVEN, STRETCHED = (28, 108), (17, 14, 56)
 """Nodes of the convolution over u and the tilt of h; of two roughnesses, over the azimuth of h first."""
 
 
