@@ -67,8 +67,8 @@ class TwoScale(LobeModel):
 
     Polished, brushed or coated metals, and in a blend the coat of a plastic, whose highlights have a bright core and a
     wide, coloured haze. The finer roughness has the rms height sigma_s and a power spectrum of the correlation length b
-    and the exponent c; facets follow the exponential power distribution, which is Beckmann's if p = 1. In spectral variants
-    every wavelength is diffracted as it should.
+    and the exponent c; facets follow the exponential power distribution, which is Beckmann's if p = 1. In spectral
+    variants every wavelength is diffracted as it should.
     """
 
     citation = CITATION
