@@ -52,6 +52,14 @@ CASES = {  # description and parameters
         {"type": "interfacedlambertian", "scattering": "multiple", "alpha": 0.6},
         ["alpha.value", "int_ior.value", "diffuse_reflectance.value"],
     ),
+    "double, stretched": (
+        {"type": "interfacedlambertian", "scattering": "double", "alpha_u": 0.2, "alpha_v": 0.5},
+        ["alpha_u.value", "int_ior.value"],
+    ),
+    "double by one of its alphas": (  # whose table carries no derivatives, beside what does
+        {"type": "interfacedlambertian", "scattering": "double", "alpha_u": 0.2, "alpha_v": 0.5},
+        ["alpha_u.value"],
+    ),
     "stretched": ({"type": "interfacedlambertian", "alpha_u": 0.2, "alpha_v": 0.5}, ["alpha_u.value", "int_ior.value"]),
     "twoscale": (
         {"type": "twoscale", "material": "Cu", "sigma_s": 0.05},

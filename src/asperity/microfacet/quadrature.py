@@ -12,6 +12,7 @@ import drjit as dr
 import numpy as np
 
 from .numerics import TINY, heading
+from .tables import Table
 
 if TYPE_CHECKING:
     from .distributions import Distribution
@@ -56,6 +57,8 @@ def _with_own_derivatives(tree: Any) -> Any:
     """The same values: a loop cannot share the derivatives of its state with what else is made of it (Dr.Jit 1.5)."""
     if isinstance(tree, tuple | list):
         return type(tree)(map(_with_own_derivatives, tree))
+    if isinstance(tree, Table):
+        return tree  # of another size than what is summed; all that is gathered from one adds up
     if is_dataclass(tree) and not isinstance(tree, type):
         return replace(tree, **{part.name: _with_own_derivatives(getattr(tree, part.name)) for part in fields(tree)})
     return tree + 0 if dr.is_array_v(tree) and dr.grad_enabled(tree) else tree

@@ -167,12 +167,12 @@ def two_bounces(
     """(c_1, c_2), reciprocal: f of two bounces is Q c_1 + Q^2 c_2, and what is `mirrored_twice`."""
 
     def of_cavity(m: Any, captured: tuple) -> tuple:
-        n, tau, wi, wo = captured
-        m = dr.normalize(m)
+        n, own, wi, wo = captured
+        table, m = own or tau, dr.normalize(m)
         other = opposite(m)
         lit, seen = Met.along(wi, m), Met.along(wo, other)
         both = transmitted_twice(lit.facing, seen.facing, n) * lit.share * seen.share
-        body_body = both * exchange(lit.part, seen.part, m.z) * tau(lit.part, seen.part, m.z)
+        body_body = both * exchange(lit.part, seen.part, m.z) * table(lit.part, seen.part, m.z)
         part, cos = mirrored_part(wi, m, lit, seen)
         mirror_body = fresnel(lit.facing, n) * transmitted_twice(cos, seen.facing, n) * part * seen.facing
         part, cos = mirrored_part(wo, other, seen, lit)
@@ -180,7 +180,9 @@ def two_bounces(
         return (mirror_body + body_mirror) / (wi.z * wo.z), body_body
 
     wi, wo = by_grazing(distribution, wi, wo)
-    once, twice = over_normals(of_cavity, distribution, wi, (n, tau, wi, wo), rings, azimuths)
+    # A table without derivatives must not be part of the loop's state, where other arrays have some (Dr.Jit 1.5).
+    own = tau if dr.grad_enabled(tau) else None
+    once, twice = over_normals(of_cavity, distribution, wi, (n, own, wi, wo), rings, azimuths)
     return once * (2 / math.pi), twice * (2 / math.pi)
 
 
