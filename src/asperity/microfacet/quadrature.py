@@ -128,7 +128,6 @@ def over_normals(
     captured: Any,
     rings: int = 16,
     azimuths: int = 16,
-    nested: bool = False,
 ) -> tuple:
     """Integrals of ``f(m, captured) D(m) m_z`` over all normals m, for ``f`` that returns a tuple, 0 if m.towards <= 0.
 
@@ -141,7 +140,7 @@ def over_normals(
 
     nodes are even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the
     more grazing of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Both
-    numbers of nodes are even; ``captured`` and ``nested`` are those of `integrate`.
+    numbers of nodes are even; ``captured`` is that of `integrate`.
     """
     vector: Any = type(towards)
 
@@ -168,7 +167,7 @@ def over_normals(
     nodes, weights = gauss_legendre(rings)
     Float: Any = type(towards.z)
     everything = (distribution, towards, captured)
-    if not dr.is_jit_v(Float) or (nested and dr.grad_enabled(ring(0, nodes[0], everything))):
+    if not dr.is_jit_v(Float):
         found = [[w * value for value in ring(k % 2, u, everything)] for k, (u, w) in enumerate(zip(nodes, weights))]
         return tuple(map(sum, zip(*found)))
     nodes, weights = rule(rings, Float)
