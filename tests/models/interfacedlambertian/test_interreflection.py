@@ -18,14 +18,13 @@ from asperity.models.interfacedlambertian.facets import CavityFacets
 from asperity.models.interfacedlambertian.interreflection import (
     CavityMirrors,
     EvenTransmittance,
-    More,
     exchange,
-    mirrored_albedo,
     mirrored_twice,
     two_bounces,
 )
 from asperity.models.interfacedlambertian.light import Known
 from asperity.models.interfacedlambertian.microgeometry import ExplicitCavities
+from asperity.models.interfacedlambertian.remainder import More, mirrored_albedo
 from asperity.validation.report import agreement
 
 KINDS = {"beckmann": Beckmann, "ggx": GGX}

@@ -11,7 +11,8 @@ from ...microfacet.distributions import Distribution
 from ...microfacet.tables import array_types
 from .body import body_albedo, body_integral
 from .facets import CavityFacets, Facets, SmithFacets
-from .interreflection import EvenTransmittance, More, two_bounces
+from .interreflection import EvenTransmittance, two_bounces
+from .remainder import More
 from .table import Build, PairTable, tabulate
 
 BUILDS = {
