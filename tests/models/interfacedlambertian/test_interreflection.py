@@ -1,4 +1,4 @@
-"""Two bounces and more in cavities, against what is traced, and known numbers."""
+"""Two bounces in cavities, against what is traced, and known numbers."""
 
 import asperity  # noqa: F401  isort: skip
 import math
@@ -24,7 +24,7 @@ from asperity.models.interfacedlambertian.interreflection import (
 )
 from asperity.models.interfacedlambertian.light import Known
 from asperity.models.interfacedlambertian.microgeometry import ExplicitCavities
-from asperity.models.interfacedlambertian.remainder import More, mirrored_albedo
+from asperity.models.interfacedlambertian.remainder import mirrored_albedo
 from asperity.validation.report import agreement
 
 KINDS = {"beckmann": Beckmann, "ggx": GGX}
@@ -117,59 +117,6 @@ def test_mirrors_are_drawn_by_their_density(rgb, kind, theta):
     albedo = float(mirrored_albedo(lobe.distribution, n, evaluate.vectors(towards(theta)[None]))[0])
     assert abs(weight.mean() - albedo) < 4 * weight.std() / count**0.5 + 5e-3 * albedo  # the rule's error
     assert weight.max() < 1
-
-
-@pytest.fixture(scope="module")
-def more():
-    mi.set_variant("llvm_ad_rgb")
-    found = {}
-    for kind, alpha, n in (("beckmann", 0.5, 1.5), ("beckmann", 1.0, 1.5), ("ggx", 0.5, 1.5), ("beckmann", 0.5, 1.0)):
-        distribution, index = KINDS[kind](mi.Float(alpha), mi.Float(alpha)), mi.Float(n)
-        tau, white = EvenTransmittance.made(index), body_albedo(mi.Float(1), index)
-
-        def body(wi, wo, distribution=distribution, index=index, tau=tau, white=white):
-            once, twice = two_bounces(distribution, index, tau, wi, wo)
-            single = body_integral(distribution, CavityFacets(), index, wi, wo, 12, 32) / math.pi
-            return white * (single + once + white * twice)
-
-        found[kind, alpha, n] = More.made(distribution, index, body, mi.Vector3f, True)
-    return found
-
-
-def eps_mean(found):
-    """As the table holds eps / sqrt(pi eps_mean)."""
-    return math.pi * float(More.hemispherical(found.missing, mi.Float)[0]) ** 2
-
-
-@pytest.mark.parametrize(
-    ("surface", "mean", "left"),
-    [
-        (("beckmann", 0.5, 1.5), 0.0137, (0.049, 0.28)),
-        (("beckmann", 1.0, 1.5), 0.078, (0.039, 0.24)),
-        (("ggx", 0.5, 1.5), None, (0.033, 0.21)),
-        (("beckmann", 0.5, 1.0), None, (0.108, 0.48)),
-    ],
-)
-def test_more_bounces_by_an_independent_tracer(more, surface, mean, left):
-    """Energy, to the tracer's .001; and the share of it that is left at K_d = .5 and .8, which is roughly modelled."""
-    found, n = more[surface], mi.Float(surface[2])
-    if mean is not None:
-        assert eps_mean(found) == pytest.approx(mean, abs=1e-3)
-    for albedo, expected in zip((0.5, 0.8, 1.0), (*left, 1)):
-        share = found.left.at(body_albedo(mi.Float(albedo), n) / body_albedo(1, n))[0]
-        assert float(share[0]) == pytest.approx(expected, abs=0.018)
-
-
-def test_more_bounces_close_the_furnace(more):
-    """What they return along any direction is what is missing: eps."""
-    found = more["beckmann", 1.0, 1.5]
-    for theta in (0, 40, 70, 87):
-        wi = evaluate.vectors(np.broadcast_to(towards(theta), (1 << 14, 3)))
-        wo = evaluate.uniform_hemisphere(1 << 14, 1)
-        returned = float(dr.mean(found(wi, wo, mi.Float(1)) * wo.z)[0]) * 2 * math.pi
-        eps = float(found.missing.at(mi.Float(math.cos(math.radians(theta)) ** 0.5), 0)[0][0])
-        eps *= math.sqrt(math.pi * eps_mean(found))
-        assert returned == pytest.approx(eps, rel=0.02)  # 2^14 samples of a cosine: .6 %
 
 
 @pytest.mark.parametrize(("kind", "alpha", "n"), [(Beckmann, 0.5, 1.5), (GGX, 0.6, 1.3), (GGX, 0.3, 1.0)])
