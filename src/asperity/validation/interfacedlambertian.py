@@ -55,7 +55,7 @@ OUTGOING = np.arange(-85.0, 90.0, 5.0)
 """Degrees in the plane of incidence, negative towards the light."""
 INDICES, ROUGHNESSES = (1.0, 1.3, 1.5), (0.2, 0.6)
 COARSE, FACING = 0.02, 0.1
-"""Relative error of ``approximate`` at the 95th percentile, where the cosine exceeds the latter: .6 to 1.3 % were found."""
+"""Error of ``approximate`` at the 95th percentile, where the cosine exceeds the latter: .6 to 1.3 % were found."""
 MANY = 64, 128
 """Rings and azimuths of a sum over normals whose error is far less than that of the model."""
 
