@@ -28,6 +28,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from ...microfacet.fast import polynomial
 from ...microfacet.numerics import clamp, keep
 
 GRAZING = 1e-4
@@ -91,14 +92,6 @@ class Directions(NamedTuple):
         """Those of two vectors; those below the horizon are meaningless, and masked by the caller."""
         sin2 = (dr.square(wi.x) + dr.square(wi.y)) * (dr.square(wo.x) + dr.square(wo.y))
         return cls(dr.maximum(wi.z, GRAZING), dr.maximum(wo.z, GRAZING), wi.x * wo.x + wi.y * wo.y, sin2)
-
-
-def polynomial(x: Any, coefficients: Sequence[Any]) -> Any:
-    """Sum of ``coefficients[k] x^k``."""
-    total = coefficients[-1]
-    for coefficient in coefficients[-2::-1]:
-        total = total * x + coefficient
-    return total
 
 
 # The particles.
