@@ -141,15 +141,19 @@ def over_normals(
     nodes are even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the
     more grazing of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Both
     numbers of nodes are even; ``captured`` is that of `integrate`.
+
+    Derivatives by the distribution are those of D at nodes that stay: if they moved, the steps and kinks of ``f`` would
+    be lost between them.
     """
     vector: Any = type(towards)
 
     def ring(odd: int, u: Any, everything: Any) -> tuple:
         """The mean around it."""
         distribution, towards, captured = everything
-        x, y = distribution.alpha_u * towards.x, distribution.alpha_v * towards.y
+        still = dr.detach(distribution)
+        x, y = still.alpha_u * towards.x, still.alpha_v * towards.y
         along, across = heading(x, y)
-        steepest = distribution.least_slope(u) * (x * along + y * across)
+        steepest = still.least_slope(u) * (x * along + y * across)
         square, terms = (1 + dr.minimum(towards.z / dr.maximum(steepest, TINY), 1)) / 2, []  # sin^2(chi_0 / 2)
         for step in range(azimuths // 2 + odd):
             half = math.pi * (step + (1 - odd) / 2) / azimuths  # t / 2
@@ -160,8 +164,12 @@ def over_normals(
             sin = 2 * dr.sqrt(square) * math.sin(half) * cosine * inverse
             for side in (sin, -sin) if 0 < half < math.pi / 2 else (sin,):
                 psi = along * (1 - 2 * sine) - across * side, across * (1 - 2 * sine) + along * side
-                (x, y), weight = distribution.slopes(*psi, u)
-                terms.append([share * (weight / azimuths) * value for value in f(vector(x, y, 1), captured)])
+                (x, y), weight = still.slopes(*psi, u)
+                m = vector(x, y, 1)
+                if dr.grad_enabled(distribution):
+                    density = distribution.density(dr.normalize(m))
+                    weight = weight * (density / dr.detach(density))
+                terms.append([share * (weight / azimuths) * value for value in f(m, captured)])
         return tuple(map(sum, zip(*terms)))
 
     nodes, weights = gauss_legendre(rings)
