@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
+from .fast import sincos
 from .numerics import TINY, heading
 from .tables import Table
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
 RULES = (4, 5, 6, 8, 12, 16)
 """Numbers of nodes that models use in recorded loops: add yours, or `dr.freeze` does not find them."""
+
+
+TURN = 1e-5
+"""Less than the sine of any angle between nodes, and more than the rounding of 0."""
 
 
 @cache
@@ -146,50 +151,61 @@ def over_normals(
     be lost between them.
     """
     vector: Any = type(towards)
+    Float: Any = type(towards.z)
+    halves = [np.pi * (np.arange(azimuths // 2 + odd) + (1 - odd) / 2) / azimuths for odd in (0, 1)]  # t / 2
+    steps = [list(zip(np.sin(half).tolist(), np.cos(half).tolist())) for half in halves]
 
-    def ring(odd: int, u: Any, everything: Any) -> tuple:
-        """The mean around it."""
+    def around(steps: list, u: Any, everything: Any) -> tuple:
+        """What the nodes at +-t of a ring add to its mean, for some (sin(t / 2), cos(t / 2))."""
         distribution, towards, captured = everything
         still = dr.detach(distribution)
         x, y = still.alpha_u * towards.x, still.alpha_v * towards.y
         along, across = heading(x, y)
         steepest = still.least_slope(u) * (x * along + y * across)
-        square, terms = (1 + dr.minimum(towards.z / dr.maximum(steepest, TINY), 1)) / 2, []  # sin^2(chi_0 / 2)
-        for step in range(azimuths // 2 + odd):
-            half = math.pi * (step + (1 - odd) / 2) / azimuths  # t / 2
-            sine = square * math.sin(half) ** 2
-            cosine = dr.maximum(1 - sine, TINY)
-            inverse = dr.rsqrt(cosine)
-            share = dr.sqrt(square) * inverse * math.cos(half) if half < math.pi / 2 else 1  # dchi / dt
-            sin = 2 * dr.sqrt(square) * math.sin(half) * cosine * inverse
-            for side in (sin, -sin) if 0 < half < math.pi / 2 else (sin,):
-                psi = along * (1 - 2 * sine) - across * side, across * (1 - 2 * sine) + along * side
-                (x, y), weight = still.slopes(*psi, u)
+        facing = dr.minimum(towards.z / dr.maximum(steepest, TINY), 1)
+        square, rest, terms = (1 + facing) / 2, (1 - facing) / 2, []  # sin^2(chi_0 / 2), cos^2
+        for sin_t, cos_t in steps:
+            sine = square * (sin_t * sin_t)  # sin^2(chi / 2)
+            cosine = dr.maximum(rest + square * (cos_t * cos_t), TINY)
+            share = dr.select(cos_t > TURN, dr.sqrt(square / cosine) * cos_t, 1) / azimuths  # dchi / dt
+            sin, cos, once = 2 * dr.sqrt(sine * cosine), 1 - 2 * sine, (sin_t < TURN) | (cos_t < TURN)
+            for side in (sin,) if once is True else (sin, -sin):
+                (x, y), weight = still.slopes(along * cos - across * side, across * cos + along * side, u)
                 m = vector(x, y, 1)
                 if dr.grad_enabled(distribution):
                     density = distribution.density(dr.normalize(m))
                     weight = weight * (density / dr.detach(density))
-                terms.append([share * (weight / azimuths) * value for value in f(m, captured)])
+                if dr.is_array_v(once):  # of two nodes that are one, half
+                    weight = dr.select(once, weight / 2, weight)
+                terms.append([share * weight * value for value in f(m, captured)])
         return tuple(map(sum, zip(*terms)))
 
-    nodes, weights = gauss_legendre(rings)
-    Float: Any = type(towards.z)
     everything = (distribution, towards, captured)
     if not dr.is_jit_v(Float):
-        found = [[w * value for value in ring(k % 2, u, everything)] for k, (u, w) in enumerate(zip(nodes, weights))]
+        rings_and_weights = zip(*gauss_legendre(rings))
+        found = [[w * x for x in around(steps[k % 2], u, everything)] for k, (u, w) in enumerate(rings_and_weights)]
         return tuple(map(sum, zip(*found)))
     nodes, weights = rule(rings, Float)
 
-    def both(index: Any, everything: Any) -> tuple:
-        """Two rings."""
-        found = []
-        for odd in (0, 1):
-            u, weight = (dr.gather(Float, values, 2 * index + odd) for values in (nodes, weights))
-            found.append([weight * value for value in ring(odd, u, everything)])
-        return tuple(map(sum, zip(*found)))
+    def on(ring: Any, steps: list, everything: Any) -> list:
+        u, weight = (dr.gather(Float, values, ring) for values in (nodes, weights))
+        return [weight * value for value in around(steps, u, everything)]
 
-    start = tuple(dr.zeros(type(value)) for value in f(towards, captured))
-    return accumulate(both, dr.uint32_array_t(Float)(rings // 2), start, everything)
+    def two_rings(index: Any, everything: Any) -> tuple:
+        return tuple(map(sum, zip(*(on(2 * index + odd, steps[odd], everything) for odd in (0, 1)))))
+
+    def one_step(index: Any, everything: Any) -> tuple:
+        """Slower, but with derivatives two rings compile ten times as long."""
+        pair, step = index // (azimuths + 1), Float(index % (azimuths + 1))
+        odd = step > azimuths / 2 - 0.25
+        half = dr.select(odd, step - azimuths // 2, step + 0.5) * (math.pi / azimuths)
+        return tuple(on(2 * pair + dr.select(odd, type(index)(1), 0), [sincos(half)], everything))
+
+    first = f(towards, captured)
+    start = tuple(dr.zeros(type(value)) for value in first)
+    differentiated = dr.grad_enabled(first) or dr.grad_enabled(distribution)
+    term, count = (one_step, rings // 2 * (azimuths + 1)) if differentiated else (two_rings, rings // 2)
+    return accumulate(term, dr.uint32_array_t(Float)(count), start, everything)
 
 
 def by_grazing(distribution: Distribution, i: Any, o: Any) -> tuple[Any, Any]:
