@@ -20,7 +20,7 @@ import drjit as dr
 
 from . import ggx
 from .epd import Power
-from .numerics import TINY, heading, normalised, one_minus_exp
+from .numerics import TINY, heading, log1p, normalised, one_minus_exp
 from .quadrature import integrate
 from .sampling import direction
 
@@ -180,8 +180,9 @@ class Phong(Distribution):
     @staticmethod
     def tilt_density(alpha: Any, sin: Any, cos: Any) -> Any:
         """D_iso at the tilt with this sine and cosine."""
-        # Half the logarithm of a small sin^2 is exact where that of a cosine near 1 has lost its digits.
-        log_cos = dr.select(sin < 0.5, dr.log(dr.maximum(1 - sin * sin, TINY)) / 2, dr.log(dr.maximum(cos, TINY)))
+        # Half of ln(1 - sin^2) where the logarithm of a cosine near 1 has lost its digits.
+        near, far = dr.minimum(sin, 0.5), dr.maximum(cos, TINY)
+        log_cos = dr.select(sin < 0.5, log1p(-near * near) / 2, dr.log(far))
         return dr.exp(Phong.exponent(alpha) * log_cos) / (dr.pi * dr.square(alpha))
 
     @staticmethod

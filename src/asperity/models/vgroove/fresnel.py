@@ -14,10 +14,13 @@ The kaleidoscope gives u = phi - pi/2 and w = pi/2 - k b instead of phi and k b.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
+
+from ...microfacet.fast import exp_of_negative, lesser
 
 DEGREE = 6
 NODES = (np.cos(np.pi * (np.arange(DEGREE + 1) + 0.25) / (DEGREE + 1.5)) + 1) / 2
@@ -89,3 +92,51 @@ def product(e: list, fan: Fan) -> Any:
         alike = fan.k * dr.select(fan.odd | (cos > 0), cos_u, -cos_u) * TURNED[n - 1]
         logarithm = logarithm + e[n] * dr.select(regular, numerator / dr.select(regular, sin, 1), alike)
     return dr.exp(dr.minimum(logarithm, 0))
+
+
+def with_partner(mean: Any, half: Any) -> list:
+    """(mean + half)^n + (mean - half)^n for n = 1..6."""
+    x, y = mean * mean, half * half
+    first, second = 2 * mean, 2 * (x + y)
+    return [
+        first,
+        second,
+        first * (x + 3 * y),
+        2 * (x * x + y * (6 * x + y)),
+        first * (x * x + y * (10 * x + 5 * y)),
+        second * (x * x + y * (14 * x + y)),
+    ]
+
+
+def through(logarithm: Any, powers: list) -> Any:
+    """Product of the reflectances at some cosines, of which these are the sums of powers 1..6."""
+    return exp_of_negative(lesser(sum(a * power for a, power in zip(logarithm, powers)), 0))
+
+
+@dataclass
+class Path:
+    """The product of a long path's reflectances, in a groove of any width that leads from one direction to the other.
+
+    The sum of ln F over angles that are spaced by 2 b is, by Euler and Maclaurin, 1 / (2 b) times its integral over the
+    path, which is as long as from the angle x to pi - y, and b / 12 times the difference of its slopes there. That of
+    sin^n is the recursive I_n = ((n - 1) I_(n-2) + h_n) / n, with h_n = sin^(n-1) x cos x + sin^(n-1) y cos y.
+    """
+
+    along: Any
+    ends: Any
+
+    @classmethod
+    def of(cls, logarithm: Any, length: Any, x: tuple, y: tuple, angle: Any) -> Path:
+        """Between x and y, each a sine and cosine, which are ``angle`` = pi - x - y apart."""
+        h, integrals, scale, along, ends = [x[1], y[1]], [angle], length, 0, 0
+        for n, a in enumerate(logarithm, 1):
+            difference = h[0] + h[1]
+            integrals.append(difference if n == 1 else ((n - 1) * integrals[-2] + difference) * (1 / n))
+            along = along + (0.5 * scale * integrals[-1]) * a
+            ends = ends + ((n / 12) * scale * difference) * a
+            h, scale = [h[0] * x[0], h[1] * y[0]], scale * length
+        return cls(along, ends)
+
+    def __call__(self, b: Any, inverse: Any) -> Any:
+        """The product, for b and 1 / b."""
+        return exp_of_negative(lesser(self.along * inverse + self.ends * b, 0))

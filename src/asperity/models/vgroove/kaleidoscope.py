@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+from ...microfacet.fast import angles
 from ...microfacet.numerics import heading
 
 
@@ -131,10 +132,15 @@ class Pair:
         # In the mirror direction the plane is any, and the plane of incidence as good as others.
         x, y = heading(h.x, h.y, heading(i.x - o.x, i.y - o.y))
         flat = h.x * x + h.y * y
-        norm = dr.sqrt(dr.square(flat) + dr.square(h.z))  # 2 l cos delta
-        sin, cos = flat / norm, h.z / norm
+        sin, cos, norm = _polar(flat, h.z)  # 2 l cos delta
         across = ((i.x - o.x) * x + (i.y - o.y) * y) * cos - (i.z - o.z) * sin
-        across = dr.abs(across)  # 2 l sin delta
-        double = dr.sqrt(dr.square(across) + dr.square(norm))
-        delta = dr.atan2(across, norm)
-        return cls(x, y, dr.atan2(flat, h.z), sin, cos, delta, across / double, norm / double, double / 2)
+        sin_delta, cos_delta, double = _polar(dr.abs(across), norm)  # 2 l
+        theta, delta = angles((cos, sin), (cos_delta, sin_delta))
+        return cls(x, y, theta, sin, cos, delta, sin_delta, cos_delta, double / 2)
+
+
+def _polar(y: Any, x: Any) -> tuple[Any, Any, Any]:
+    """(sine, cosine, length) of the vector (x, y)."""
+    square = dr.square(x) + dr.square(y)
+    inverse = dr.rsqrt(square)
+    return y * inverse, x * inverse, square * inverse

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -22,7 +24,8 @@ from .fresnel import Reflectance, fit
 from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric_bounces
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
-from .symmetric import symmetric
+from .symmetric import WRITTEN, symmetric
+from .terms import ROUGHEST, by_terms
 from .tilts import Tilts
 
 CITATION = """\
@@ -105,6 +108,8 @@ class VGroove(LobeModel):
             lost = f"alpha = {alpha:g}: more than 0.1 % of the light bounces over {MOST} times, and is lost."
             warnings.warn(lost, stacklevel=2)
         self.most = dr.opaque(mi.UInt32, most) if dr.is_jit_v(mi.Float) else most
+        self.few = min(most, WRITTEN + 1)
+        self.rough = alpha is None or alpha > ROUGHEST
         self.logarithm = self._constant_logarithm()
 
     def flags(self) -> list[int]:
@@ -117,7 +122,10 @@ class VGroove(LobeModel):
         if not self.metal.mirror:
             once = self.at("metal", si, active)
             reflectance = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm)
-        return [GrooveLobe(self.kind(*self._alphas(si, active)), self.symmetric, self.most, reflectance)]
+        brdf = nonsymmetric
+        if self.symmetric:
+            brdf = by_terms if self.rough else partial(symmetric, few=self.few)
+        return [GrooveLobe(self.kind(*self._alphas(si, active)), brdf, self.symmetric, self.most, reflectance)]
 
     def _alphas(self, si: Any, active: Any) -> tuple[Any, Any]:
         if self.alpha is None:
@@ -151,6 +159,7 @@ class GrooveLobe(Lobe):
     """The lobe of grooves: all ways through them, however many bounces that takes."""
 
     distribution: Distribution
+    brdf: Callable  # (pair, cos_i, tilts, most, reflectance) -> (f cos_o, the same of mirrors)
     symmetric: bool
     most: Any  # bounces that are followed
     reflectance: Reflectance | None  # None is a mirror
@@ -159,8 +168,7 @@ class GrooveLobe(Lobe):
         """(f cos_o, density), which is the same for mirrors."""
         pair = Pair.of(wi, wo)
         tilts = Tilts.along(self.distribution, pair.cos_azimuth, pair.sin_azimuth)
-        brdf = symmetric if self.symmetric else nonsymmetric
-        return brdf(pair, wi.z, tilts, self.most, self.reflectance)
+        return self.brdf(pair, wi.z, tilts, self.most, self.reflectance)
 
     def draw(self, wi: Any, u: Any, v: Any) -> Any:
         """Where a ray goes that meets a groove by chance; nowhere above, if it bounces too often, and is lost."""
