@@ -21,7 +21,7 @@ from ...microfacet.sampling import direction, more_numbers
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Reflectance, fit
-from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric_bounces
+from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, polar, symmetric_way
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
 from .symmetric import WRITTEN, symmetric
@@ -131,6 +131,9 @@ class VGroove(LobeModel):
         if self.alpha is None:
             alpha = dr.sqrt(2 / (self.at("exponent", si, active) + 2))
             return alpha, alpha
+        if self.isotropic:
+            alpha = clamp(self.at("alpha", si, active)[0], SMOOTHEST, self.kind.largest)
+            return alpha, alpha
         u, v = (clamp(alpha, SMOOTHEST, self.kind.largest) for alpha in self.at("alpha", si, active))
         return u, v
 
@@ -182,16 +185,17 @@ class GrooveLobe(Lobe):
         """
         x, y = self.distribution.sample_azimuth(v.y)
         tilts = Tilts.along(self.distribution, x, y)
-        tilt = partner = dr.atan2(*tilts.sample(v.x))
-        if not self.symmetric:
-            partner = dr.atan2(*tilts.sample_partner(*more_numbers(u, v.x, v.y)))
-        groove = Groove(tilt, partner)
-        across = wi.x * x + wi.y * y
-        psi, length = dr.atan2(across, wi.z), dr.sqrt(dr.square(across) + dr.square(wi.z))
-        offset, swap = entrance(groove, psi, u)
-        groove, psi = groove.swapped(swap), dr.select(swap, -psi, psi)
+        tilt = tilts.sample(v.x)
+        sin_psi, cos_psi, length = polar(wi.x * x + wi.y * y, wi.z)
+        if self.symmetric:
+            swap, k, (sin, cos) = symmetric_way((sin_psi, cos_psi), tilt, u, self.most)
+        else:
+            groove = Groove(dr.atan2(*tilt), dr.atan2(*tilts.sample_partner(*more_numbers(u, v.x, v.y))))
+            psi = dr.atan2(sin_psi, cos_psi)
+            offset, swap = entrance(groove, psi, u)
+            groove, psi = groove.swapped(swap), dr.select(swap, -psi, psi)
+            k = bounces(groove, psi, offset, self.most)
+            sin, cos = dr.sincos(exit_angle(groove, psi, k))
         x, y = dr.select(swap, -x, x), dr.select(swap, -y, y)
-        k = (symmetric_bounces if self.symmetric else bounces)(groove, psi, offset, self.most)
-        sin, cos = dr.sincos(exit_angle(groove, psi, k))
         along = wi.y * x - wi.x * y  # across the plane of the kaleidoscope; turns round
         return direction(length * sin * x + along * y, length * sin * y - along * x, length * cos), k
