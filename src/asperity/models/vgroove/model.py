@@ -20,7 +20,7 @@ from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
-from .fresnel import Reflectance, fit
+from .fresnel import Reflectance, fit, fit_power
 from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, polar, symmetric_way
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
@@ -110,7 +110,7 @@ class VGroove(LobeModel):
         self.most = dr.opaque(mi.UInt32, most) if dr.is_jit_v(mi.Float) else most
         self.few = min(most, WRITTEN + 1)
         self.rough = alpha is None or alpha > ROUGHEST
-        self.logarithm = self._constant_logarithm()
+        self.logarithm, self.power = self._constant_fits()
 
     def flags(self) -> list[int]:
         """One glossy lobe."""
@@ -121,7 +121,7 @@ class VGroove(LobeModel):
         reflectance = None
         if not self.metal.mirror:
             once = self.at("metal", si, active)
-            reflectance = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm)
+            reflectance = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm, self.power)
         brdf = nonsymmetric
         if self.symmetric:
             brdf = by_terms if self.rough else partial(symmetric, few=self.few)
@@ -148,13 +148,14 @@ class VGroove(LobeModel):
             alphas = np.sqrt(2 / (np.maximum(alphas, 0) + 2))
         return float(np.clip(alphas.max(), SMOOTHEST, min(type(self).alpha.high, self.kind.largest)))
 
-    def _constant_logarithm(self) -> list | None:
-        """ln F's fit if it is the same everywhere, for good: else it takes 7 Fresnel terms a call."""
+    def _constant_fits(self) -> tuple[list | None, list | None]:
+        """Those of ln F and F if it is the same everywhere, for good: else the first takes 7 Fresnel terms a call."""
         if self.metal.mirror or not settled(*self.metal.textures().values()):
-            return None
-        logarithm = fit(self.at("metal", dr.zeros(mi.SurfaceInteraction3f), True))
+            return None, None
+        once = self.at("metal", dr.zeros(mi.SurfaceInteraction3f), True)
+        logarithm = fit(once)
         dr.make_opaque(logarithm)
-        return logarithm
+        return logarithm, fit_power(once)
 
 
 @dataclass
