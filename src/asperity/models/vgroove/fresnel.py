@@ -85,7 +85,7 @@ def multiples(sin: Any, cos: Any) -> list[tuple]:
     found = [(sin, cos)]
     for _ in range(DEGREE - 1):
         s, c = found[-1]
-        found.append((s * cos + c * sin, c * cos - s * sin))
+        found.append((dr.fma(s, cos, c * sin), dr.fma(c, cos, -s * sin)))
     return found
 
 
@@ -119,20 +119,28 @@ def product(e: list, fan: Fan) -> Any:
 def with_partner(mean: Any, half: Any) -> list:
     """(mean + half)^n + (mean - half)^n for n = 1..6."""
     x, y = mean * mean, half * half
-    first, second = 2 * mean, 2 * (x + y)
+    first, second, square = 2 * mean, 2 * (x + y), x * x
     return [
         first,
         second,
-        first * (x + 3 * y),
-        2 * (x * x + y * (6 * x + y)),
-        first * (x * x + y * (10 * x + 5 * y)),
-        second * (x * x + y * (14 * x + y)),
+        first * dr.fma(3, y, x),
+        2 * dr.fma(y, dr.fma(6, x, y), square),
+        first * dr.fma(y, 5 * dr.fma(2, x, y), square),
+        second * dr.fma(y, dr.fma(14, x, y), square),
     ]
 
 
 def through(logarithm: Any, powers: list) -> Any:
     """Product of the reflectances at some cosines, of which these are the sums of powers 1..6."""
-    return exp_of_negative(lesser(sum(a * power for a, power in zip(logarithm, powers)), 0))
+    return exp_of_negative(lesser(total(logarithm, powers), 0))
+
+
+def total(a: Any, b: Any) -> Any:
+    """Sum of products; in this order, spectra are multiplied by numbers."""
+    found = a[0] * b[0]
+    for one, other in zip(a[1:], b[1:]):
+        found = dr.fma(one, other, found)
+    return found
 
 
 @dataclass
@@ -150,15 +158,15 @@ class Path:
     @classmethod
     def of(cls, logarithm: Any, length: Any, x: tuple, y: tuple, angle: Any) -> Path:
         """Between x and y, each a sine and cosine, which are ``angle`` = pi - x - y apart."""
-        h, integrals, scale, along, ends = [x[1], y[1]], [angle], length, 0, 0
-        for n, a in enumerate(logarithm, 1):
-            difference = h[0] + h[1]
-            integrals.append(difference if n == 1 else ((n - 1) * integrals[-2] + difference) * (1 / n))
-            along = along + (0.5 * scale * integrals[-1]) * a
-            ends = ends + ((n / 12) * scale * difference) * a
+        h, integrals, scale, along, ends = [x[1], y[1]], [angle], length, [], []
+        for n in range(1, DEGREE + 1):
+            slope = h[0] + h[1]
+            integrals.append(slope if n == 1 else dr.fma((n - 1) / n, integrals[-2], slope * (1 / n)))
+            along.append(0.5 * scale * integrals[-1])
+            ends.append((n / 12) * scale * slope)
             h, scale = [h[0] * x[0], h[1] * y[0]], scale * length
-        return cls(along, ends)
+        return cls(total(logarithm, along), total(logarithm, ends))
 
     def __call__(self, b: Any, inverse: Any) -> Any:
         """The product, for b and 1 / b."""
-        return exp_of_negative(lesser(self.along * inverse + self.ends * b, 0))
+        return exp_of_negative(lesser(dr.fma(self.along, inverse, self.ends * b), 0))

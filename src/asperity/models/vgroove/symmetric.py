@@ -63,7 +63,10 @@ def symmetric(
     if reflectance is None:
         return mirrored, mirrored
     light = Light.of(pair, sides, reflectance)
-    return single * light.once + sum(w * light.through(groove) for w, groove in zip(weights, grooves)), mirrored
+    value = single * light.once
+    for weight, groove in zip(weights, grooves):
+        value = dr.fma(weight, light.through(groove), value)
+    return value, mirrored
 
 
 def cook_torrance_share(pair: Pair) -> Any:
@@ -165,7 +168,7 @@ class Side:
         width = self.one_sided(sin, cos)
         if tau > 0:
             sin_y, cos_y = self.difference
-            width = greater(lesser(sin * cos_y + cos * sin_y, 2 * self.half_width(sin, cos)), 0)
+            width = greater(lesser(dr.fma(sin, cos_y, cos * sin_y), 2 * self.half_width(sin, cos)), 0)
         return Groove(sin, cos, width * (1 / k), self.odd, k)
 
     def _quarter(self, tau: int) -> tuple[Any, Any]:
@@ -176,12 +179,12 @@ class Side:
 
     def half_width(self, sin: Any, cos: Any) -> Any:
         """cos P sin(b - Q), or 0: half the width for both sides, for the sine and cosine of b."""
-        return greater(self.cos_p * (sin * self.cos_q - cos * self.sin_q), 0)
+        return greater(self.cos_p * dr.fma(sin, self.cos_q, -cos * self.sin_q), 0)
 
     def one_sided(self, sin: Any, cos: Any) -> Any:
         """sin(b - P - Q), or 0: the width for the side -1."""
         sin_x, cos_x = self.sum
-        return greater(sin * cos_x - cos * sin_x, 0)
+        return greater(dr.fma(sin, cos_x, -cos * sin_x), 0)
 
 
 @dataclass

@@ -74,7 +74,7 @@ class GGXTilts(Tilts):
     def densities(self, tilts: list[tuple[Any, Any]]) -> list:
         """D = alpha^2 / (pi (sin^2 a + alpha^2 cos^2 a)^2), by a division for every four."""
         square = dr.square(self.alpha)
-        scale, roots = square * dr.inv_pi * self.scale, [sin * sin + square * (cos * cos) for sin, cos in tilts]
+        scale, roots = square * dr.inv_pi * self.scale, [dr.fma(square, cos * cos, sin * sin) for sin, cos in tilts]
         inverse = [x for n in range(0, len(roots), 4) for x in reciprocals(*roots[n : n + 4])]
         return [scale * dr.square(x) for x in inverse]
 
