@@ -13,7 +13,7 @@ import drjit as dr
 import mitsuba as mi
 
 from .errors import ParameterError, suggestion
-from .microfacet.fresnel import Metal, fitted, mirror
+from .microfacet.fresnel import FittedMetal, Metal, fitted, mirror
 from .microfacet.numerics import clamp, keep
 from .parameters import Colour, Parameter, Row, Spectrum, Usual, settled
 
@@ -31,7 +31,7 @@ class Complex:
     k: Any = None
     reflectivity: Any = None
     edge_tint: Any = None
-    fitted: Metal | None = None  # if it is the same everywhere
+    fitted: FittedMetal | None = None  # if it is the same everywhere
 
     def textures(self) -> dict[str, Any]:
         """Those of the chosen way, by name."""
@@ -41,7 +41,8 @@ class Complex:
         """The same, with the fit that belongs to what its textures hold now."""
         if self.mirror or not settled(*self.textures().values()):
             return replace(self, fitted=None)
-        return replace(self, fitted=fitted(self._metal(dr.zeros(mi.SurfaceInteraction3f), True)))
+        metal = fitted(self._metal(dr.zeros(mi.SurfaceInteraction3f), True))
+        return replace(self, fitted=metal if isinstance(metal, FittedMetal) else None)
 
     @property
     def mirror(self) -> bool:

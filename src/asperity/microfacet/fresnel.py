@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,26 +84,48 @@ def fitted(metal: Metal) -> Metal:
     Of Mitsuba's materials that is all but AlSb, MgO, SnTe and ThF4, which are like glass at some colour. Two in three
     are good to 1e-6.
     """
-    roots = [_root(metal.eta, metal.k, float(cos2)) for cos2 in NODES]
-    modulus, root = _fit([a * a + b * b for a, b in roots]), _fit([a for a, _ in roots])
-    unit = dr.rcp(modulus[0])
-    found = FittedMetal(metal.eta, metal.k, unit, *([unit * power for power in one] for one in (modulus, root)))
-    dr.make_opaque(found)  # other values need no other kernel
     cos = dr.scalar.ArrayXf64(np.linspace(1e-3, 1, 100))
-    for eta, k, one, *powers in zip(*map(_channels, (found.eta, found.k, unit, *found.modulus, *found.root))):
-        above, below = _fraction(cos, one, powers[: DEGREE + 1], powers[DEGREE + 1 :])
-        exact = conductor(cos, eta, k)
+    for channel in by_channel(metal):
+        _, _, unit, *powers = _coefficients(channel)
+        above, below = _fraction(cos, unit, powers[: DEGREE + 1], powers[DEGREE + 1 :])
+        exact = channel(cos)
         if not dr.all((dr.abs(above / below - exact) < ALLOWED * exact) & (above < below)):
             return metal
-    return found
+    eta, k, unit, *powers = constants(_coefficients, metal)
+    return FittedMetal(eta, k, unit, powers[: DEGREE + 1], powers[DEGREE + 1 :])
 
 
-def _fit(values: list) -> list:
-    return [sum(weight * value for weight, value in zip(row, values)) for row in FIT]
+def by_channel(metal: Metal) -> list[Metal]:
+    """A metal that is the same everywhere, colour by colour, by plain numbers."""
+    eta, k = (np.array(part, dtype=float).ravel().tolist() for part in (metal.eta, metal.k))
+    return list(map(Metal, eta, k))
 
 
-def _channels(spectrum: Any) -> list[float]:
-    return np.array(spectrum, dtype=float).ravel().tolist()
+def constants(f: Callable[[Metal], list], metal: Metal) -> list:
+    """The spectra ``f(metal)`` of a metal that is the same everywhere; opaque, so that others need no other kernel.
+
+    In double precision, without which fits lose digits. By plain numbers, since kernels for this would take a user's
+    time to compile; but in a frozen function, which replays kernels only, by them.
+    """
+    spectrum: Any = type(metal.eta)
+    if dr.flag(dr.JitFlag.FreezingScope):
+        double = dr.float64_array_t(spectrum)
+        found = [spectrum(one) for one in f(Metal(double(metal.eta), double(metal.k)))]
+        dr.make_opaque(found)
+        return found
+    number: Any = dr.value_t(spectrum)
+    opaque = (lambda value: number([value])) if dr.is_jit_v(number) else float
+    return [spectrum(*map(opaque, one)) for one in zip(*map(f, by_channel(metal)))]
+
+
+def _coefficients(metal: Metal) -> list:
+    """The fields of a `FittedMetal` in a row."""
+    roots = [_root(metal.eta, metal.k, float(cos2)) for cos2 in NODES]
+    modulus, root = (
+        [sum(w * value for w, value in zip(row, values)) for row in FIT]
+        for values in ([a * a + b * b for a, b in roots], [a for a, _ in roots])
+    )
+    return [metal.eta, metal.k, *(one / dr.maximum(modulus[0], LEAST) for one in (1, *modulus, *root))]
 
 
 def _fraction(cos: Any, unit: Any, modulus: Any, root: Any) -> tuple[Any, Any]:

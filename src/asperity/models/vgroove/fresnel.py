@@ -21,15 +21,16 @@ import drjit as dr
 import numpy as np
 
 from ...microfacet.fast import exp_of_negative, lesser, polynomial
+from ...microfacet.fresnel import Metal, by_channel, constants
 
 DEGREE = 6
 NODES = (np.cos(np.pi * (np.arange(DEGREE + 1) + 0.25) / (DEGREE + 1.5)) + 1) / 2
-FIT = np.linalg.pinv(NODES[:, None] ** np.arange(1, DEGREE + 1)).tolist()
+FIT = np.linalg.pinv(NODES[:, None] ** np.arange(1, DEGREE + 1))
 """From ln F at the nodes to a_1..a_6; F(0) = 1, so a_0 = 0. The worst error of all c: .06 % of gold's F, .1 % of
 copper's, 1 % of aluminium's and chromium's, whose F turns sharply near grazing angles."""
 POWERS = 8
 FEW_NODES = (np.cos(np.pi * (np.arange(24) + 0.5) / 24) + 1) / 2
-FIT_FEW = np.linalg.pinv(FEW_NODES[:, None] ** np.arange(1, POWERS + 1)).tolist()
+FIT_FEW = np.linalg.pinv(FEW_NODES[:, None] ** np.arange(1, POWERS + 1))
 """From F - 1 at the nodes to the coefficients of a polynomial without a constant term."""
 ALLOWED = 3e-4
 """Largest error of that polynomial, of F itself: gold's is 9e-5, copper's 1.2e-4, silver's 2e-4."""
@@ -52,18 +53,23 @@ class Reflectance(NamedTuple):
 def fit(once: Callable) -> list:
     """The coefficients a_1..a_6 of ln F, for the reflectance ``once``."""
     logs = [dr.log(dr.maximum(once(float(cos)), 1e-6)) for cos in NODES]
-    return [sum(weight * log for weight, log in zip(row, logs)) for row in FIT]
+    return [sum(weight * log for weight, log in zip(row, logs)) for row in FIT.tolist()]
 
 
-def fit_power(once: Callable) -> list | None:
-    """The coefficients p_1..p_8 of F for the reflectance ``once``, the same everywhere; None if it is no polynomial."""
+def fit_power(once: Callable) -> list:
+    """The coefficients p_1..p_8 of F, for the reflectance ``once``."""
     values = [once(float(cos)) for cos in FEW_NODES]
-    Double, spectrum = dr.float64_array_t(values[0]), type(values[0])  # float32 would lose three digits
-    power = [spectrum(sum(w * (Double(value) - 1) for w, value in zip(row, values))) for row in FIT_FEW]
-    dr.make_opaque(power, values)
-    above = FEW_NODES[:, None] ** np.arange(1, POWERS + 1) @ np.array([np.array(p, dtype=float).ravel() for p in power])
-    exact = np.array([np.array(value, dtype=float).ravel() for value in values])
-    return power if (np.abs(1 + above - exact) < ALLOWED * exact).all() else None
+    return [sum(w * (value - 1) for w, value in zip(row, values)) for row in FIT_FEW.tolist()]
+
+
+def fit_constant(metal: Metal) -> tuple[list, list | None]:
+    """Both fits of a metal that is the same everywhere; None for that of F if it is not good to `ALLOWED`."""
+    cos = dr.scalar.ArrayXf64(FEW_NODES)
+    good = all(
+        dr.all(dr.abs(polynomial(cos, [1, *fit_power(channel)]) / channel(cos) - 1) < ALLOWED)
+        for channel in by_channel(metal)
+    )
+    return constants(fit, metal), constants(fit_power, metal) if good else None
 
 
 def waves(logarithm: Any, length: Any) -> list:

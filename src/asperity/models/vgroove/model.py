@@ -20,7 +20,7 @@ from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
-from .fresnel import Reflectance, fit, fit_power
+from .fresnel import Reflectance, fit, fit_constant
 from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, polar, symmetric_way
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
@@ -152,10 +152,7 @@ class VGroove(LobeModel):
         """Those of ln F and F if it is the same everywhere, for good: else the first takes 7 Fresnel terms a call."""
         if self.metal.mirror or not settled(*self.metal.textures().values()):
             return None, None
-        once = self.at("metal", dr.zeros(mi.SurfaceInteraction3f), True)
-        logarithm = fit(once)
-        dr.make_opaque(logarithm)
-        return logarithm, fit_power(once)
+        return fit_constant(self.at("metal", dr.zeros(mi.SurfaceInteraction3f), True))
 
 
 @dataclass
