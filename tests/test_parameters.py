@@ -131,16 +131,16 @@ def test_artist_friendly_metal_reflects_what_was_asked(rgb, reflectivity, edge_t
 
 def test_a_metal_is_fitted_once_where_it_is_settled(rgb):
     bsdf = mi.load_dict({"type": "micrograin", "eta": 0.2, "k": 3.0})
-    before, params = bsdf.model.metal.fitted, mi.traverse(bsdf)
+    before, params = bsdf.model.metal.fit.result, mi.traverse(bsdf)
     params["k.value"] = 4.0
     params.update()
-    assert isinstance(before, FittedMetal) and before.k[0] == 3 and bsdf.model.metal.fitted.k[0] == 4
+    assert isinstance(before, FittedMetal) and before.k[0] == 3 and bsdf.model.metal.fit.result.k[0] == 4
     dr.enable_grad(params["k.value"])
     params.update()
-    assert bsdf.model.metal.fitted is None
-    assert mi.load_dict({"type": "micrograin", "eta": bitmap(0.2, 0.3), "k": 3.0}).model.metal.fitted is None
+    assert bsdf.model.metal.fit.result is None
+    assert mi.load_dict({"type": "micrograin", "eta": bitmap(0.2, 0.3), "k": 3.0}).model.metal.fit.result is None
     mi.set_variant("llvm_ad_spectral")  # rays choose the wavelengths
-    assert mi.load_dict({"type": "micrograin", "eta": 0.2, "k": 3.0}).model.metal.fitted is None
+    assert mi.load_dict({"type": "micrograin", "eta": 0.2, "k": 3.0}).model.metal.fit.result is None
 
 
 @pytest.mark.parametrize("given", [0, -3, 1001, 2.0, True, "two"])

@@ -91,9 +91,8 @@ class Parameter:
         """The parsed value at a surface point."""
         return value
 
-    def updated(self, value: Any) -> Any:
-        """The parsed value, with what is made from it once for all points if it is `settled`."""
-        return value
+    def update(self, value: Any) -> None:
+        """Bring up to date what is made from the parsed value once for all points, if it is `settled`."""
 
     def counts(self, model: Declared) -> bool:
         """Whether this means anything to ``model``, with its choices and flags."""
@@ -519,7 +518,7 @@ class Declared:
     def refresh(self) -> None:
         """Bring everything up to date, at first and whenever ``mi.traverse`` changed a parameter."""
         for parameter in self.declarations():
-            setattr(self, parameter.name, parameter.updated(getattr(self, parameter.name)))
+            parameter.update(getattr(self, parameter.name))
         self.update()
 
     def update(self) -> None:

@@ -78,8 +78,8 @@ class FittedMetal(Metal):
         return type(self.eta)([a * inverse for a, inverse in zip(above, reciprocals(*below))])
 
 
-def fitted(metal: Metal) -> Metal:
-    """As a `FittedMetal`, if its error is `ALLOWED`; or ``metal`` itself, which is the same everywhere.
+def fitted(metal: Metal) -> FittedMetal | None:
+    """A metal that is the same everywhere as a `FittedMetal`, if the error of that is `ALLOWED`.
 
     Of Mitsuba's materials that is all but AlSb, MgO, SnTe and ThF4, which are like glass at some colour. Two in three
     are good to 1e-6.
@@ -90,7 +90,7 @@ def fitted(metal: Metal) -> Metal:
         above, below = _fraction(cos, unit, powers[: DEGREE + 1], powers[DEGREE + 1 :])
         exact = channel(cos)
         if not dr.all((dr.abs(above / below - exact) < ALLOWED * exact) & (above < below)):
-            return metal
+            return None
     eta, k, unit, *powers = constants(_coefficients, metal)
     return FittedMetal(eta, k, unit, powers[: DEGREE + 1], powers[DEGREE + 1 :])
 

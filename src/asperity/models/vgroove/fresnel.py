@@ -69,7 +69,8 @@ def fit_constant(metal: Metal) -> tuple[list, list | None]:
         dr.all(dr.abs(polynomial(cos, [1, *fit_power(channel)]) / channel(cos) - 1) < ALLOWED)
         for channel in by_channel(metal)
     )
-    return constants(fit, metal), constants(fit_power, metal) if good else None
+    found = constants(lambda metal: fit(metal) + fit_power(metal), metal)
+    return found[:DEGREE], found[DEGREE:] if good else None
 
 
 def waves(logarithm: Any, length: Any) -> list:

@@ -18,7 +18,8 @@ from ...lobes import Lobe, LobeModel, glossy
 from ...microfacet.distributions import DISTRIBUTIONS, Distribution
 from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
-from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
+from ...microfacet.tables import Made
+from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Reflectance, fit, fit_constant
 from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, polar, symmetric_way
@@ -75,7 +76,7 @@ class VGroove(LobeModel):
     def configure(self, given: set[str]) -> None:
         """Settle which of the roughnesses is used."""
         conflict({"alpha", "alpha_u", "alpha_v"} & given, {"exponent"} & given)
-        self.isotropic = self.alpha.isotropic
+        self.isotropic, self.fits = self.alpha.isotropic, Made()
         if "exponent" in given:
             self.alpha = None
         self.check()
@@ -110,7 +111,11 @@ class VGroove(LobeModel):
         self.most = dr.opaque(mi.UInt32, most) if dr.is_jit_v(mi.Float) else most
         self.few = min(most, WRITTEN + 1)
         self.rough = alpha is None or alpha > ROUGHEST
-        self.logarithm, self.power = self._constant_fits()
+        metal = self.metal.settled()
+        if metal is None:
+            self.fits.clear()
+        else:
+            self.fits.update(lambda *_: fit_constant(metal), *metal.eta, *metal.k)
 
     def flags(self) -> list[int]:
         """One glossy lobe."""
@@ -121,7 +126,7 @@ class VGroove(LobeModel):
         reflectance = None
         if not self.metal.mirror:
             once = self.at("metal", si, active)
-            reflectance = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm, self.power)
+            reflectance = Reflectance(once, *(self.fits.result or (fit(once), None)))
         brdf = nonsymmetric
         if self.symmetric:
             brdf = by_terms if self.rough else partial(symmetric, few=self.few)
@@ -147,12 +152,6 @@ class VGroove(LobeModel):
         if self.alpha is None:
             alphas = np.sqrt(2 / (np.maximum(alphas, 0) + 2))
         return float(np.clip(alphas.max(), SMOOTHEST, min(type(self).alpha.high, self.kind.largest)))
-
-    def _constant_fits(self) -> tuple[list | None, list | None]:
-        """Those of ln F and F if it is the same everywhere, for good: else the first takes 7 Fresnel terms a call."""
-        if self.metal.mirror or not settled(*self.metal.textures().values()):
-            return None, None
-        return fit_constant(self.at("metal", dr.zeros(mi.SurfaceInteraction3f), True))
 
 
 @dataclass
