@@ -108,7 +108,7 @@ def test_constant_reflectance_multiplies_by_bounces(rgb, monkeypatch, symmetric)
     grooves = "asperity.models.vgroove"
     monkeypatch.setattr(f"{grooves}.nonsymmetric.product", lambda e, fan: mi.Color3f(rho ** mi.Float(fan.k)))
     monkeypatch.setattr(f"{grooves}.symmetric.through", lambda *_: mi.Color3f(rho**4))  # the middle one of 5 is apart
-    monkeypatch.setattr(Path, "of", lambda a, l, x, y, angle: Path(mi.Color3f(float(np.log(rho)) / 2 * angle), 0))
+    monkeypatch.setattr(Path, "of", lambda a, l, x, y, angle: Path(mi.Color3f(float(np.log(rho)) / 2 * angle), 0, 0))
     given = {"alpha": 0.7, "symmetric": symmetric}
     mean, _, largest = albedo(20, material="Au", max_bounces=most, **given)
     model = mi.load_dict({"type": "vgroove", **given, "max_bounces": most}).model

@@ -154,26 +154,35 @@ def total(a: Any, b: Any) -> Any:
 class Path:
     """The product of a long path's reflectances, in a groove of any width that leads from one direction to the other.
 
-    The sum of ln F over angles that are spaced by 2 b is, by Euler and Maclaurin, 1 / (2 b) times its integral over the
-    path, which is as long as from the angle x to pi - y, and b / 12 times the difference of its slopes there. That of
-    sin^n is the recursive I_n = ((n - 1) I_(n-2) + h_n) / n, with h_n = sin^(n-1) x cos x + sin^(n-1) y cos y.
+    The cosines of its bounces are l sin of angles 2 b apart, the first one b beyond x, the last one b before
+    pi - y. So the sum of f = ln F is, by Euler and Maclaurin,
+
+        int f / (2 b) - b [f'] / 12 + 7 b^3 [f^(3)] / 720,   between x and pi - y.
+
+    With h_n = sin^(n-1) x cos x + sin^(n-1) y cos y, of sin^n the integral is I_n = ((n - 1) I_(n-2) + h_n) / n, the
+    first bracket -n h_n, and the other one -n ((n - 1) (n - 2) h_(n-2) - n^2 h_n).
     """
 
     along: Any
     ends: Any
+    bends: Any
 
     @classmethod
     def of(cls, logarithm: Any, length: Any, x: tuple, y: tuple, angle: Any) -> Path:
         """Between x and y, each a sine and cosine, which are ``angle`` = pi - x - y apart."""
-        h, integrals, scale, along, ends = [x[1], y[1]], [angle], length, [], []
+        slopes, integrals, power, (at_x, at_y) = [0, 0], [angle], length, (x[1], y[1])
+        along, ends, bends = list[Any](), list[Any](), list[Any]()
         for n in range(1, DEGREE + 1):
-            slope = h[0] + h[1]
+            slopes.append(at_x + at_y)
+            before, _, slope = slopes[-3:]
             integrals.append(slope if n == 1 else dr.fma((n - 1) / n, integrals[-2], slope * (1 / n)))
-            along.append(0.5 * scale * integrals[-1])
-            ends.append((n / 12) * scale * slope)
-            h, scale = [h[0] * x[0], h[1] * y[0]], scale * length
-        return cls(total(logarithm, along), total(logarithm, ends))
+            third = n * n * slope if n < 3 else dr.fma(n * n, slope, -(n - 1) * (n - 2) * before)
+            along.append(0.5 * power * integrals[-1])
+            ends.append((n / 12) * power * slope)
+            bends.append((7 * n / 720) * power * third)
+            at_x, at_y, power = at_x * x[0], at_y * y[0], power * length
+        return cls(total(logarithm, along), total(logarithm, ends), total(logarithm, bends))
 
     def __call__(self, b: Any, inverse: Any) -> Any:
         """The product, for b and 1 / b."""
-        return exp_of_negative(lesser(dr.fma(self.along, inverse, self.ends * b), 0))
+        return exp_of_negative(lesser(dr.fma(self.along, inverse, b * dr.fma(self.bends, b * b, self.ends)), 0))
