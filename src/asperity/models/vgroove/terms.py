@@ -16,8 +16,8 @@ from .kaleidoscope import Pair
 from .symmetric import POLE, bounce_limits, cook_torrance_share, numbered
 from .tilts import Tilts
 
-ROUGHEST = 2.0
-"""Roughness up to which `symmetric` is as good as this."""
+ROUGHEST = 1.5
+"""Roughness up to which `symmetric` is good to 1 %; at 2 it has 1.4 %, and loses .15 % of the density."""
 
 
 def by_terms(pair: Pair, cos_i: Any, tilts: Tilts, most: Any, reflectance: Reflectance | None) -> tuple[Any, Any]:
