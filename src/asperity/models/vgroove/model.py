@@ -46,9 +46,8 @@ SMOOTHEST = 1e-3
 class VGroove(LobeModel):
     """Metal whose microfacets pair up to V-shaped grooves, in which light is reflected as often as it takes.
 
-    Exact for its geometry, without noise, tables or fits. Facets of equal tilt (``symmetric``, a closed form, fast)
-    leave a sharp glint in the mirror direction, whatever the roughness; facets of independent tilts soften it, by
-    quadrature.
+    Without noise, and exact for its geometry but for some .1 %. Facets of equal tilt (``symmetric``, fast) leave a
+    sharp glint in the mirror direction, whatever the roughness; facets of independent tilts soften it, by quadrature.
     """
 
     citation = CITATION
