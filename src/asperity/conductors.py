@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,9 +13,10 @@ import drjit as dr
 import mitsuba as mi
 
 from .errors import ParameterError, suggestion
-from .microfacet.fresnel import Metal, mirror
+from .microfacet.fresnel import Metal, fitted, mirror
 from .microfacet.numerics import clamp, keep
-from .parameters import Colour, Parameter, Row, Spectrum, Usual
+from .microfacet.tables import Made
+from .parameters import Colour, Parameter, Row, Spectrum, Usual, settled
 
 ETA = Spectrum("", low=1e-3, high=100.0, usually=Usual(0.1, 10, logarithmic=True))
 K, TINT = Spectrum("", high=100.0, usually=Usual(0.1, 10, logarithmic=True)), Colour("")
@@ -31,6 +32,25 @@ class Complex:
     k: Any = None
     reflectivity: Any = None
     edge_tint: Any = None
+    fit: Made = field(default_factory=Made)  # a `FittedMetal`, if it is the same everywhere
+
+    def textures(self) -> dict[str, Any]:
+        """Those of the chosen way, by name."""
+        return {name: getattr(self, name) for name in PARTS if getattr(self, name) is not None}
+
+    def settled(self) -> Metal | None:
+        """The metal, if it is the same everywhere, for good."""
+        if self.mirror or not settled(*self.textures().values()):
+            return None
+        return self._metal(dr.zeros(mi.SurfaceInteraction3f), True)
+
+    def update(self) -> None:
+        """Bring the fit up to date."""
+        metal = self.settled()
+        if metal is None:
+            self.fit.clear()
+        else:
+            self.fit.update(lambda *_: fitted(metal), *metal.eta, *metal.k)
 
     @property
     def mirror(self) -> bool:
@@ -41,6 +61,9 @@ class Complex:
         """Fresnel's reflectance at a surface point, a function of the cosine of incidence; 1 of a mirror."""
         if self.mirror:
             return mirror
+        return self._metal(si, active) if self.fit.result is None else self.fit.result
+
+    def _metal(self, si: Any, active: Any) -> Metal:
         if self.eta is not None:
             return Metal(ETA.at(self.eta, si, active), K.at(self.k, si, active))
         return Metal(*artist_friendly(self.reflectivity.eval(si, active), self.edge_tint.eval(si, active)))
@@ -108,10 +131,15 @@ class Conductor(Parameter):
         """Reflectance, a function of the cosine of incidence; None if there is no metal."""
         return None if value is None else value.reflectance(si, active)
 
+    def update(self, value: Any) -> None:
+        """Bring its fit up to date."""
+        if value is not None:
+            value.update()
+
     def children(self, value: Any) -> Mapping[str, Any]:
         """The textures of the chosen way."""
-        parts = {} if value is None else vars(value)
-        return {name + self.suffix: texture for name, texture in parts.items() if texture is not None}
+        parts = {} if value is None else value.textures()
+        return {name + self.suffix: texture for name, texture in parts.items()}
 
     def check(self, value: Any) -> None:
         """Check the textures of the chosen way."""

@@ -89,3 +89,12 @@ def test_lesser_and_greater_drop_what_is_not_a_number():
     assert [f(a, b).numpy()[0] for f in (fast.lesser, fast.greater) for a, b in [(1, llvm.Float(2)), (nan, 3)]] == [
         1, 3, 2, 3,
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("part", "function", "slope"), [(0, np.sin, np.cos), (1, np.cos, lambda x: -np.sin(x))])
+def test_acute_sincos(part, function, slope):
+    x = np.concatenate([np.linspace(0, 1.1, N), np.geomspace(1e-20, 1, N)]).astype(np.float32)
+    value, derivative = found(lambda x: fast.acute_sincos(x)[part], x)
+    x = x.astype(float)
+    assert np.abs(value / function(x) - 1)[x > 0].max() < 4e-7
+    assert np.abs(derivative - slope(x)).max() < 1e-6

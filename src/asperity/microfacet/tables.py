@@ -110,6 +110,10 @@ class Made:
     result: Any = None
     constants: tuple[float, ...] | None = None  # what it was made from; None if they carried derivatives
 
+    def clear(self) -> None:
+        """Have nothing."""
+        self.result = self.constants = None
+
     def update(self, make: Callable, *constants: Any) -> None:
         """Let ``result`` be ``make(*constants)``; of numbers, or of Dr.Jit arrays that hold one."""
         current = None
