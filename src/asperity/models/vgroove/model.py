@@ -18,6 +18,7 @@ from ...lobes import Lobe, LobeModel, glossy
 from ...microfacet.distributions import DISTRIBUTIONS, Distribution
 from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
+from ...microfacet.tables import Made
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Reflectance, fit
@@ -25,6 +26,8 @@ from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
 from .symmetric import WRITTEN, symmetric
+from .table import ROUGHEST as TABULATED
+from .table import Tabulated
 from .terms import ROUGHEST, by_terms
 from .tilts import Tilts
 
@@ -76,6 +79,7 @@ class VGroove(LobeModel):
         """Settle which of the roughnesses is used."""
         conflict({"alpha", "alpha_u", "alpha_v"} & given, {"exponent"} & given)
         self.isotropic = self.alpha.isotropic
+        self.table = Made()
         if "exponent" in given:
             self.alpha = None
         self.check()
@@ -111,6 +115,7 @@ class VGroove(LobeModel):
         self.few = min(most, WRITTEN + 1)
         self.rough = alpha is None or alpha > ROUGHEST
         self.logarithm = self._constant_logarithm()
+        self._tabulate(most)
 
     def flags(self) -> list[int]:
         """One glossy lobe."""
@@ -122,7 +127,7 @@ class VGroove(LobeModel):
         if not self.metal.mirror:
             once = self.at("metal", si, active)
             reflectance = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm)
-        brdf = nonsymmetric
+        brdf = self.table.result or nonsymmetric
         if self.symmetric:
             brdf = by_terms if self.rough else partial(symmetric, few=self.few)
         return [GrooveLobe(self.kind(*self._alphas(si, active)), brdf, self.symmetric, self.most, reflectance)]
@@ -144,6 +149,16 @@ class VGroove(LobeModel):
         if self.alpha is None:
             alphas = np.sqrt(2 / (np.maximum(alphas, 0) + 2))
         return float(np.clip(alphas.max(), SMOOTHEST, min(type(self).alpha.high, self.kind.largest)))
+
+    def _tabulate(self, most: int) -> None:
+        """Make the table, anew if something changed, where there is one: else quadrature takes its place."""
+        roughness = self.exponent if self.alpha is None else self.alpha.textures.get("alpha")
+        constant = roughness is not None and settled(roughness) and (self.metal.mirror or self.logarithm is not None)
+        if self.symmetric or not (constant and dr.is_jit_v(mi.Float)) or (alpha := self._roughest()) > TABULATED:
+            self.table = Made()
+            return
+        shown = [] if self.logarithm is None else [number for term in self.logarithm for number in np.ravel(term)]
+        self.table.update(lambda *_: Tabulated.of(self.kind, alpha, most, self.logarithm), alpha, most, *shown)
 
     def _constant_logarithm(self) -> list | None:
         """ln F's fit if it is the same everywhere, for good: else it takes 7 Fresnel terms a call."""

@@ -25,14 +25,15 @@ from typing import Any
 import drjit as dr
 
 from ...microfacet.distributions import GGX, Beckmann, Phong
+from ...microfacet.fast import greater, reciprocals
 from ...microfacet.quadrature import accumulate, integrate
 from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
 from .kaleidoscope import Pair
 from .symmetric import POLE, numbered
 from .tilts import Tilts
 
-NODES = {GGX: (6, 4, 5), Beckmann: (12, 4, 8), Phong: (12, 4, 8)}
-"""For k = 1 and k = 2, in each piece between kinks, and for all others, whose share is small.
+NODES = {GGX: (4, 5), Beckmann: (4, 8), Phong: (4, 8)}
+"""For k = 2, in each piece between kinks, and for all others, whose share is small.
 
 A density has to be exact to .05 % or so: what its integral misses looks like lost samples. Tails of GGX are smoother.
 """
@@ -40,37 +41,57 @@ A density has to be exact to .05 % or so: what its integral misses looks like lo
 
 def nonsymmetric(pair: Pair, cos_i: Any, tilts: Tilts, most: Any, reflectance: Reflectance | None) -> tuple[Any, Any]:
     """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``reflectance`` is None."""
-    pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
-    captured = pair, tilts, pole, [] if reflectance is None else waves(reflectance.logarithm, pair.length)
+    once = 1 if reflectance is None else reflectance.once(pair.length * pair.cos_delta)
+    colour, mirrored = several(pair, tilts, most, reflectance, NODES[tilts.distribution])
+    pole, scale = reciprocals(greater(pair.sin_theta, POLE), 4 * cos_i * pair.cos_delta)
+    single, pole = scale * single_bounce(pair, tilts), pole * scale / tilts.partner()
+    return single * once + pole * colour, single + pole * mirrored
+
+
+def single_bounce(pair: Pair, tilts: Tilts) -> Any:
+    """4 cos_i cos delta times f cos_o of mirrors after one bounce, from a facet whose normal is the half vector.
+
+    What x, the steeper direction, sees of it is cos delta; or, if the partner's tilt r is more than pi/2 - x, which
+    leaves it partly in shadow, cos x sin(theta + r) / sin r. Its mean over partners is closed.
+    """
+    sin_x = pair.sin_theta * pair.cos_delta + pair.cos_theta * pair.sin_delta
+    cos_x = greater(pair.cos_theta * pair.cos_delta - pair.sin_theta * pair.sin_delta, 0)
+    flatter, steeper = tilts.partners(cos_x, sin_x)
+    seen = flatter * pair.cos_delta + cos_x * ((1 - flatter) * pair.cos_theta + steeper * pair.sin_theta)
+    return tilts.density(pair.sin_theta, pair.cos_theta) * seen
+
+
+def several(
+    pair: Pair, tilts: Tilts, most: Any, reflectance: Reflectance | None, nodes: tuple[int, int]
+) -> tuple[Any, Any]:
+    """4 cos_i cos delta sin theta C times (f cos_o, the same of mirrors) of two bounces and more, by these `NODES`."""
+    captured = pair, tilts, [] if reflectance is None else waves(reflectance.logarithm, pair.length)
 
     def with_bounces(totals: tuple, counted: tuple, nodes: int, double: bool) -> tuple:
         count, numbers = counted
 
         def term(index: Any, captured: Any) -> tuple:
-            (k, odd, tau), (pair, tilts, pole, e) = numbers(index), captured
+            (k, odd, tau), (pair, tilts, e) = numbers(index), captured
             p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
             way = Way(k, odd, tau * p, q)
             weight, mean, variance = moments(way, tilts, nodes, double)
-            weight = weight * 2 * pole / dr.select(odd, k + 1, k)
+            weight = weight * 2 / dr.select(odd, k + 1, k)
             if not e:
                 return (weight,)
             # The product varies little over the grooves: one node, or two, of the Gauss rule for their distribution.
             if not double:
                 return weight, weight * way.reflected(mean, e)
-            spread = dr.sqrt(dr.maximum(variance, 1e-12))
+            spread = dr.sqrt(greater(variance, 1e-12))
             return weight, weight / 2 * (way.reflected(mean - spread, e) + way.reflected(mean + spread, e))
 
         return accumulate(term, count, totals, captured)
 
-    few, double, multiple = NODES[tilts.distribution]
-    single, limits = _single(pair, tilts, few), bounce_limits_nonsymmetric(pair)
-    totals: tuple = (single,)
-    if reflectance is not None:
-        totals = single, single * reflectance.once(pair.length * pair.cos_delta)
+    double, multiple = nodes
+    zero, limits = dr.zeros(type(pair.theta)), bounce_limits_nonsymmetric(pair)
+    totals: tuple = (zero,) if reflectance is None else (zero, zero * reflectance.logarithm[0])
     totals = with_bounces(totals, numbered(limits, dr.minimum(most, type(most)(2))), double, True)
     totals = with_bounces(totals, numbered(limits, most, first_even=4), multiple, False)
-    scale = dr.rcp(4 * cos_i * pair.cos_delta * tilts.partner())
-    return scale * totals[-1], scale * totals[0]
+    return totals[-1], totals[0]
 
 
 def bounce_limits_nonsymmetric(pair: Pair) -> tuple:
@@ -97,30 +118,6 @@ def bounce_limits_nonsymmetric(pair: Pair) -> tuple:
         return (dr.pi - 2 * tau * delta) / dr.maximum(below, 1e-6)
 
     return odd(1), odd(-1), even(1), even(-1)
-
-
-def _single(pair: Pair, tilts: Tilts, nodes: int) -> Any:
-    """The integral of a single bounce, from a facet whose normal is the half vector.
-
-    Over t with tan r = alpha tan t, in which D varies evenly, and on either side of the tilt that begins to shade.
-    """
-    l, x = (pair.sin_theta, pair.cos_theta), dr.sincos(pair.theta + pair.delta)
-    shade = dr.atan2(x[1], tilts.alpha * x[0])
-
-    def at(node: Any, captured: Any) -> tuple:
-        total, (tilts, l, x, shade) = 0, captured
-        alpha = tilts.alpha
-        for low, high in ((0, shade), (shade, dr.pi / 2)):
-            sin, cos = dr.sincos(low + (high - low) * node)
-            stretch = dr.rsqrt(dr.square(alpha * sin) + dr.square(cos))
-            r = alpha * sin * stretch, cos * stretch
-            f_0, f_1 = _reaches(x, l, r)
-            weight = tilts.density(*r) * r[0] * dr.maximum(f_1 - dr.maximum(f_0, 0), 0)
-            total = total + (high - low) * alpha * dr.square(stretch) * weight
-        return (total,)
-
-    (integral,) = integrate(at, nodes, (tilts, l, x, shade), pair.theta)
-    return tilts.density(*l) * integral
 
 
 @dataclass
