@@ -22,9 +22,9 @@ from ...microfacet.tables import Made
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Reflectance, fit
-from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric_bounces
+from .kaleidoscope import Groove, Pair, entrance, exit_angle, symmetric_bounces
 from .microgeometry import ExplicitGrooves
-from .nonsymmetric import nonsymmetric
+from .nonsymmetric import nonsymmetric, nonsymmetric_way
 from .symmetric import WRITTEN, symmetric
 from .table import ROUGHEST as TABULATED
 from .table import Tabulated
@@ -197,16 +197,17 @@ class GrooveLobe(Lobe):
         """
         x, y = self.distribution.sample_azimuth(v.y)
         tilts = Tilts.along(self.distribution, x, y)
-        tilt = partner = dr.atan2(*tilts.sample(v.x))
-        if not self.symmetric:
-            partner = dr.atan2(*tilts.sample_partner(*more_numbers(u, v.x, v.y)))
-        groove = Groove(tilt, partner)
-        across = wi.x * x + wi.y * y
-        psi, length = dr.atan2(across, wi.z), dr.sqrt(dr.square(across) + dr.square(wi.z))
-        offset, swap = entrance(groove, psi, u)
-        groove, psi = groove.swapped(swap), dr.select(swap, -psi, psi)
+        tilt, across = tilts.sample(v.x), wi.x * x + wi.y * y
+        length = dr.sqrt(dr.square(across) + dr.square(wi.z))
+        if self.symmetric:
+            groove, psi = Groove(dr.atan2(*tilt), dr.atan2(*tilt)), dr.atan2(across, wi.z)
+            offset, swap = entrance(groove, psi, u)
+            psi = dr.select(swap, -psi, psi)
+            k = symmetric_bounces(groove, psi, offset, self.most)
+            sin, cos = dr.sincos(exit_angle(groove, psi, k))
+        else:
+            partner = tilts.sample_partner(*more_numbers(u, v.x, v.y))
+            swap, k, (sin, cos) = nonsymmetric_way((across / length, wi.z / length), tilt, partner, u, self.most)
         x, y = dr.select(swap, -x, x), dr.select(swap, -y, y)
-        k = (symmetric_bounces if self.symmetric else bounces)(groove, psi, offset, self.most)
-        sin, cos = dr.sincos(exit_angle(groove, psi, k))
         along = wi.y * x - wi.x * y  # across the plane of the kaleidoscope; turns round
         return direction(length * sin * x + along * y, length * sin * y - along * x, length * cos), k

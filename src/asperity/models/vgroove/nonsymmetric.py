@@ -25,7 +25,8 @@ from typing import Any
 import drjit as dr
 
 from ...microfacet.distributions import GGX, Beckmann, Phong
-from ...microfacet.fast import greater, reciprocals
+from ...microfacet.fast import angles, greater, lesser, reciprocals, sincos
+from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import accumulate, integrate
 from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
 from .kaleidoscope import Pair
@@ -231,3 +232,31 @@ def _reaches(x: tuple, near: tuple, far: tuple) -> tuple[Any, Any]:
     """
     (sin_x, cos_x), (sin_near, cos_near), (sin_far, cos_far) = x, near, far
     return -sin_near * (cos_x * cos_far - sin_x * sin_far), sin_far * (cos_x * cos_near + sin_x * sin_near)
+
+
+def nonsymmetric_way(psi: tuple, tilt: tuple, partner: tuple, u: Any, most: Any) -> tuple[Any, Any, tuple]:
+    """(swap, k, exit): `entrance`, `bounces` and `exit_angle` in closed form; angles are sines and cosines.
+
+    At the image m of a facet the ray is at the angle x_m, which grows by twice the aperture from one image of the facet
+    to its next; it reflects if sin x_m is more than its offset from the apex times the sine of the facet's tilt. Since
+    the rims are corners of a convex polygon, it leaves where that is so no more for the first time: beyond pi/2, but
+    for the image 2, whose rim may be nearer than that of 1.
+    """
+    (sin_psi, cos_psi), (sin_l, cos_l), (sin_r, cos_r) = psi, tilt, partner
+    left, right = cos_psi * cos_l + sin_psi * sin_l, cos_psi * cos_r - sin_psi * sin_r
+    inverse_l, inverse_r = reciprocals(greater(sin_l, 1e-10), greater(sin_r, 1e-10))
+    offsets = [dr.lerp(left * sin * inverse_l, -right * sin * inverse_r, u) for sin in (sin_l, sin_r)]
+    swap = offsets[0] < 0
+    sines = [lesser(dr.abs(dr.select(swap, a, b)), 1) for a, b in (offsets[::-1], offsets)]
+    cosines = [dr.sqrt((1 - sin) * (1 + sin)) for sin in sines]
+    size, l, r, first, second = angles((cos_psi, dr.abs(sin_psi)), (cos_l, sin_l), (cos_r, sin_r), *zip(cosines, sines))
+    psi = dr.select((sin_psi < 0) ^ swap, -size, size)
+    aperture = greater(dr.pi - l - r, 1e-6)
+    l = dr.select(swap, r, l)
+    x = psi + dr.pi / 2 - l
+    inverse = dr.rcp(2 * aperture)
+    even = 2 * greater(dr.floor((dr.pi - first - x) * inverse) + 1, 1)  # bounces before an image of L is missed
+    odd = 2 * greater(dr.floor((dr.pi - second - x + aperture) * inverse) + 1, 1) - 1  # before one of R
+    k = lesser(dr.select(x + aperture < second, 1, lesser(even, odd)), type(u)(most) + 1)
+    last = dr.select(k - 2 * dr.floor(k / 2) > 0.5, 2 * l - psi - (k - 1) * aperture, psi - dr.pi + k * aperture)
+    return swap, k, sincos(clamp(last, -dr.pi / 2, dr.pi / 2))
