@@ -20,6 +20,7 @@ import drjit as dr
 
 from . import ggx
 from .epd import Power
+from .fast import sincos
 from .numerics import TINY, heading, log1p, normalised, one_minus_exp
 from .quadrature import integrate
 from .sampling import direction
@@ -71,6 +72,8 @@ class Distribution:
 
     def along(self, cos_azimuth: Any, sin_azimuth: Any) -> tuple[Any, Any]:
         """(alpha_phi, scale) at this azimuth."""
+        if self.alpha_u is self.alpha_v:
+            return self.alpha_u, 1
         square = dr.rcp(dr.square(cos_azimuth / self.alpha_u) + dr.square(sin_azimuth / self.alpha_v))
         return dr.sqrt(square), square / (self.alpha_u * self.alpha_v)
 
@@ -79,6 +82,8 @@ class Distribution:
 
         That of normals has the density scale / (2 pi) over phi; over psi it is even.
         """
+        if self.alpha_u is self.alpha_v:
+            return cos_psi, sin_psi, self.alpha_u
         x, y = self.alpha_u * cos_psi, self.alpha_v * sin_psi
         square = dr.square(x) + dr.square(y)
         inverse = dr.rsqrt(square)
@@ -86,8 +91,8 @@ class Distribution:
 
     def sample_azimuth(self, v: Any) -> tuple[Any, Any]:
         """(cos phi, sin phi) of normals with density D cos."""
-        sin, cos = dr.sincos(2 * dr.pi * v)
-        return self.stretched_azimuth(cos, sin)[:2]
+        sin, cos = sincos(2 * dr.pi * v - dr.pi)
+        return self.stretched_azimuth(-cos, -sin)[:2]
 
     def density(self, m: Any) -> Any:
         """D(m) of a unit normal above the horizon."""

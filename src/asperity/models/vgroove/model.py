@@ -22,7 +22,7 @@ from ...microfacet.tables import Made
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Reflectance, fit
-from .kaleidoscope import Groove, Pair, entrance, exit_angle, symmetric_bounces
+from .kaleidoscope import Pair, polar, symmetric_way
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric, nonsymmetric_way
 from .symmetric import WRITTEN, symmetric
@@ -136,6 +136,9 @@ class VGroove(LobeModel):
         if self.alpha is None:
             alpha = dr.sqrt(2 / (self.at("exponent", si, active) + 2))
             return alpha, alpha
+        if self.isotropic:
+            alpha = clamp(self.at("alpha", si, active)[0], SMOOTHEST, self.kind.largest)
+            return alpha, alpha
         u, v = (clamp(alpha, SMOOTHEST, self.kind.largest) for alpha in self.at("alpha", si, active))
         return u, v
 
@@ -197,17 +200,13 @@ class GrooveLobe(Lobe):
         """
         x, y = self.distribution.sample_azimuth(v.y)
         tilts = Tilts.along(self.distribution, x, y)
-        tilt, across = tilts.sample(v.x), wi.x * x + wi.y * y
-        length = dr.sqrt(dr.square(across) + dr.square(wi.z))
+        tilt = tilts.sample(v.x)
+        sin_psi, cos_psi, length = polar(wi.x * x + wi.y * y, wi.z)
         if self.symmetric:
-            groove, psi = Groove(dr.atan2(*tilt), dr.atan2(*tilt)), dr.atan2(across, wi.z)
-            offset, swap = entrance(groove, psi, u)
-            psi = dr.select(swap, -psi, psi)
-            k = symmetric_bounces(groove, psi, offset, self.most)
-            sin, cos = dr.sincos(exit_angle(groove, psi, k))
+            swap, k, (sin, cos) = symmetric_way((sin_psi, cos_psi), tilt, u, self.most)
         else:
             partner = tilts.sample_partner(*more_numbers(u, v.x, v.y))
-            swap, k, (sin, cos) = nonsymmetric_way((across / length, wi.z / length), tilt, partner, u, self.most)
+            swap, k, (sin, cos) = nonsymmetric_way((sin_psi, cos_psi), tilt, partner, u, self.most)
         x, y = dr.select(swap, -x, x), dr.select(swap, -y, y)
         along = wi.y * x - wi.x * y  # across the plane of the kaleidoscope; turns round
         return direction(length * sin * x + along * y, length * sin * y - along * x, length * cos), k
