@@ -28,7 +28,7 @@ from ...microfacet.distributions import GGX, Beckmann, Phong
 from ...microfacet.fast import angles, greater, lesser, reciprocals, sincos
 from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import accumulate, integrate
-from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
+from .fresnel import Path, Reflectance, through, with_partner
 from .kaleidoscope import Pair
 from .symmetric import POLE, numbered
 from .tilts import Tilts
@@ -66,32 +66,32 @@ def several(
     pair: Pair, tilts: Tilts, most: Any, reflectance: Reflectance | None, nodes: tuple[int, int]
 ) -> tuple[Any, Any]:
     """4 cos_i cos delta sin theta C times (f cos_o, the same of mirrors) of two bounces and more, by these `NODES`."""
-    captured = pair, tilts, [] if reflectance is None else waves(reflectance.logarithm, pair.length)
-
-    def with_bounces(totals: tuple, counted: tuple, nodes: int, double: bool) -> tuple:
-        count, numbers = counted
-
-        def term(index: Any, captured: Any) -> tuple:
-            (k, odd, tau), (pair, tilts, e) = numbers(index), captured
-            p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
-            way = Way(k, odd, tau * p, q)
-            weight, mean, variance = moments(way, tilts, nodes, double)
-            weight = weight * 2 / dr.select(odd, k + 1, k)
-            if not e:
-                return (weight,)
-            # The product varies little over the grooves: one node, or two, of the Gauss rule for their distribution.
-            if not double:
-                return weight, weight * way.reflected(mean, e)
-            spread = dr.sqrt(greater(variance, 1e-12))
-            return weight, weight / 2 * (way.reflected(mean - spread, e) + way.reflected(mean + spread, e))
-
-        return accumulate(term, count, totals, captured)
-
     double, multiple = nodes
+    logarithm = None if reflectance is None else reflectance.logarithm
     zero, limits = dr.zeros(type(pair.theta)), bounce_limits_nonsymmetric(pair)
-    totals: tuple = (zero,) if reflectance is None else (zero, zero * reflectance.logarithm[0])
-    totals = with_bounces(totals, numbered(limits, dr.minimum(most, type(most)(2))), double, True)
-    totals = with_bounces(totals, numbered(limits, most, first_even=4), multiple, False)
+    totals: tuple = (zero,) if logarithm is None else (zero, zero * logarithm[0])
+
+    def term(index: Any, captured: Any) -> tuple:
+        (k, odd, tau), (pair, tilts, logarithm) = numbers(index), captured
+        p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
+        way = Way(k, odd, tau * p, q)
+        weight, mean = way.mean(tilts, multiple)
+        weight = weight * 2 / dr.select(odd, k + 1, k)
+        # The product varies little over the grooves: their mean stands for all.
+        return (weight,) if logarithm is None else (weight, weight * way.reflected(mean, pair.length, logarithm))
+
+    count, numbers = numbered(limits, most, first_even=4)
+    totals = accumulate(term, count, totals, (pair, tilts, logarithm))
+    twice = dr.select(most >= 2, 1, 0)
+    for tau in (1, -1):
+        weight, mean, variance = twice_reflected(pair, tau, tilts, double)
+        weight = weight * twice
+        totals = (totals[0] + weight, *totals[1:])
+        if logarithm is not None:
+            # Two nodes of the Gauss rule for the distribution of the grooves.
+            spread, way = dr.sqrt(greater(variance, 1e-12)), Way(2, False, tau * pair.delta, pair.theta)
+            ends = [way.reflected(r, pair.length, logarithm) for r in (mean - spread, mean + spread)]
+            totals = totals[0], totals[1] + 0.5 * weight * (ends[0] + ends[1])
     return totals[-1], totals[0]
 
 
@@ -171,14 +171,36 @@ class Way:
         in_order = dr.minimum(middle, a), dr.maximum(a, dr.minimum(middle, b)), dr.maximum(middle, b)
         return low, *(dr.clip(kink, low, high) for kink in in_order), high
 
-    def reflected(self, r: Any, e: list) -> Any:
+    def mean(self, tilts: Tilts, nodes: int) -> tuple[Any, Any]:
+        """(integral of D(l) sin l D(r) sin r g' over r, mean r)."""
+
+        def at(node: Any, captured: Any) -> tuple:
+            way, tilts, low, extent, width = captured
+            tilt = low + extent * node
+            l, r = sincos(way.first_tilt(tilt)), sincos(tilt)
+            value = tilts.product(l, r) * l[0] * r[0] * width(l, r)
+            return value, value * node
+
+        low, extent = self.interval()
+        total, first = integrate(at, nodes, (self, tilts, low, extent, Width.of(self)), self.p, nested=True)
+        return total * extent, low + extent * first * dr.rcp(greater(total, 1e-15))
+
+    def reflected(self, r: Any, length: Any, logarithm: list) -> Any:
         """Product of the reflectances in the groove with this r: u = Q and w = tau P, shifted by half r - l."""
         l = self.first_tilt(r)
         turn = (r - l) / 2
-        u = multiples(*dr.sincos(self.q + dr.select(self.odd, 0, turn)))
-        w = multiples(*dr.sincos(self.p + dr.select(self.odd, turn, 0)))
-        b = multiples(*dr.sincos((dr.pi - l - r) / 2))
-        return product(e, Fan(self.k, self.odd, numerators(u, w), [cos for _, cos in u], b))
+        u, w = self.q + dr.select(self.odd, 0, turn), self.p + dr.select(self.odd, turn, 0)
+        b = (dr.pi - l - r) / 2
+        (sin_u, cos_u), (sin, cos) = sincos(u), sincos(dr.select(self.k == 3, 2 * b, b))
+        few = with_partner(length * cos_u * cos, length * sin_u * sin)
+        if isinstance(self.k, int):  # two
+            return through(logarithm, few)
+        middle, powers = length * cos_u, []
+        for power in few:
+            powers.append(power + middle)
+            middle = middle * length * cos_u
+        path = Path.of(logarithm, length, sincos(w + u), sincos(w - u), dr.pi - 2 * w)
+        return dr.select(self.k == 3, through(logarithm, powers), path(b, dr.rcp(greater(b, 1e-6))))
 
 
 @dataclass
@@ -195,7 +217,7 @@ class Width:
     @classmethod
     def of(cls, way: Way) -> Width:
         """That of a way."""
-        return cls(way.odd, dr.sincos(way.p + way.q), dr.sincos(way.p - way.q))
+        return cls(way.odd, sincos(way.p + way.q), sincos(way.p - way.q))
 
     def __call__(self, l: tuple, r: tuple) -> Any:
         """For (sin l, cos l) and (sin r, cos r)."""
@@ -205,21 +227,22 @@ class Width:
         return dr.maximum(dr.minimum(f_1, f_k) - dr.maximum(dr.maximum(f_0, f_after), 0), 0)
 
 
-def moments(way: Way, tilts: Tilts, nodes: int, double: bool) -> tuple[Any, Any, Any]:
-    """(integral of D(l) sin l D(r) sin r g' over r, mean r, variance of r); ``double`` tells that k = 2."""
+def twice_reflected(pair: Pair, tau: int, tilts: Tilts, nodes: int) -> tuple[Any, Any, Any]:
+    """(integral of D(l) sin l D(r) sin r g' over r, mean r, variance of r) for k = 2, piece by piece."""
+    way = Way(2, False, tau * pair.delta, pair.theta)
     low, extent = way.interval()
-    ends = way.kinks(low, low + extent) if double else (low, low + extent)
+    ends = way.kinks(low, low + extent)
 
     def at(node: Any, captured: Any) -> tuple:
         (way, tilts, ends, width), sums = captured, [0, 0, 0]
         for begin, end in pairwise(ends):
             tilt = begin + (end - begin) * node
-            l, r = dr.sincos(way.first_tilt(tilt)), dr.sincos(tilt)
-            weight = (end - begin) * tilts.density(*l) * l[0] * tilts.density(*r) * r[0] * width(l, r)
+            l, r = sincos(way.first_tilt(tilt)), sincos(tilt)
+            weight = (end - begin) * tilts.product(l, r) * l[0] * r[0] * width(l, r)
             sums = [sums[0] + weight, sums[1] + weight * tilt, sums[2] + weight * tilt * tilt]
         return tuple(sums)
 
-    total, first, second = integrate(at, nodes, (way, tilts, ends, Width.of(way)), way.p, nested=True)
+    total, first, second = integrate(at, nodes, (way, tilts, ends, Width.of(way)), way.p)
     mean, square = (moment / dr.select(total > 1e-15, total, 1) for moment in (first, second))
     return total, mean, square - mean * mean
 

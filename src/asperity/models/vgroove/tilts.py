@@ -42,6 +42,10 @@ class Tilts:
         """D(m) at several tilts, each a sine and cosine."""
         return [self.density(*tilt) for tilt in tilts]
 
+    def product(self, l: tuple, r: tuple) -> Any:
+        """D(l) D(r) of two tilts, each a sine and cosine."""
+        return self.density(*l) * self.density(*r)
+
     def steepness(self) -> Any:
         """dln D / dln b at the tilt pi/2 - b, of a groove of aperture 2 b, for b near .28."""
         raise NotImplementedError
@@ -84,6 +88,12 @@ class GGXTilts(Tilts):
         scale, roots = square * dr.inv_pi * self.scale, [sin * sin + square * (cos * cos) for sin, cos in tilts]
         inverse = [x for n in range(0, len(roots), 4) for x in reciprocals(*roots[n : n + 4])]
         return [scale * dr.square(x) for x in inverse]
+
+    def product(self, l: tuple, r: tuple) -> Any:
+        """Of this form, by one division."""
+        square = dr.square(self.alpha)
+        first, second = (sin * sin + square * (cos * cos) for sin, cos in (l, r))
+        return dr.square(square * dr.inv_pi * self.scale * dr.rcp(first * second))
 
     def steepness(self) -> Any:
         """From the form above."""
