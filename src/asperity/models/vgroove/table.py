@@ -26,18 +26,18 @@ from ...microfacet.fast import greater, reciprocals
 from ...microfacet.tables import Table
 from .fresnel import Reflectance
 from .kaleidoscope import Pair
-from .nonsymmetric import NODES, several, single_bounce
+from .nonsymmetric import several, single_bounce
 from .symmetric import POLE
 from .tilts import TILTS, Tilts
 
 HALF = np.pi / 2
 ANGLES = 128, 128
 """Nodes of T, over theta and delta."""
-COLOURS = 32, 32, 32
+COLOURS = 40, 40, 24
 """Nodes of R, over theta, delta and the root of l."""
-FINE = 12, 24
-"""Of the quadrature, as `NODES`: its errors would stay in the table. R, a quotient of two sums, needs no more."""
-ROUGHEST = 1.5
+FINE, COARSE = (12, 24), (6, 12)
+"""Nodes of the quadrature for T and, as a quotient of two sums, for R: more than each ray can afford."""
+ROUGHEST = 1.2
 """Beyond this roughness steep grooves are so many that the table has errors above 1 %."""
 EDGE = 0.02
 """How far inside, in cells, the last nodes are computed: at the edges themselves all is 0 / 0."""
@@ -98,8 +98,10 @@ class Tabulated:
         if logarithm is not None:
             pair = _pairs(layout, alpha, COLOURS)
             reflectance = Reflectance(lambda cos: 1, logarithm)
-            colour, total = several(pair, tilts, bounces, reflectance, NODES[distribution])
+            colour, total = several(pair, tilts, bounces, reflectance, COARSE)
             channels = [_fourth_root(channel / greater(total, 1e-30)) for channel in colour]
+            dr.eval(channels)
+            channels = [_straddled(channel, COLOURS[-1]) for channel in channels]
             metal = Table.of(COLOURS, channels + channels[:1] * (len(channels) == 3))  # of four, read at once
         return cls(layout, mirrors, metal)
 
@@ -130,6 +132,14 @@ def _pairs(layout: Layout, alpha: float, shape: tuple) -> Pair:
     length = dr.square(mi.Float(index % depth) / (depth - 1)) if depth > 1 else mi.Float(1)
     (sin, cos), (sin_delta, cos_delta) = dr.sincos(theta), dr.sincos(delta)
     return Pair(mi.Float(1), mi.Float(0), theta, sin, cos, delta, sin_delta, cos_delta, length)
+
+
+def _straddled(values: Any, nodes: int) -> Any:
+    """Values at nodes of the last axis, moved so that a curve is on both sides of its chords: half the error."""
+    index = dr.arange(mi.UInt32, dr.width(values))
+    inner = (index % nodes > 0) & (index % nodes < nodes - 1)
+    before, after = (dr.gather(type(values), values, at, inner) for at in (index - 1, index + 1))
+    return values - dr.select(inner, before - 2 * values + after, 0) / 16
 
 
 def _horizons(pair: Pair) -> Any:
