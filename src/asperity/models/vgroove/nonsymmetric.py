@@ -28,7 +28,7 @@ from ...microfacet.distributions import GGX, Beckmann, Phong
 from ...microfacet.fast import angles, greater, lesser, reciprocals, sincos
 from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import accumulate, integrate
-from .fresnel import Path, Reflectance, through, with_partner
+from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
 from .kaleidoscope import Pair
 from .symmetric import POLE, numbered
 from .tilts import Tilts
@@ -63,35 +63,45 @@ def single_bounce(pair: Pair, tilts: Tilts) -> Any:
 
 
 def several(
-    pair: Pair, tilts: Tilts, most: Any, reflectance: Reflectance | None, nodes: tuple[int, int]
+    pair: Pair,
+    tilts: Tilts,
+    most: Any,
+    reflectance: Reflectance | None,
+    nodes: tuple[int, int],
+    each: bool = False,
 ) -> tuple[Any, Any]:
-    """4 cos_i cos delta sin theta C times (f cos_o, the same of mirrors) of two bounces and more, by these `NODES`."""
-    double, multiple = nodes
-    logarithm = None if reflectance is None else reflectance.logarithm
+    """4 cos_i cos delta sin theta C times (f cos_o, the same of mirrors) of two bounces and more, by these `NODES`.
+
+    The product of reflectances varies little over the grooves: it is that at their mean r or, for two bounces, at the
+    two nodes of the Gauss rule for their distribution; or ``each`` groove has its own, at ten times the cost.
+    """
+    e = [] if reflectance is None else waves(reflectance.logarithm, pair.length)
     zero, limits = dr.zeros(type(pair.theta)), bounce_limits_nonsymmetric(pair)
-    totals: tuple = (zero,) if logarithm is None else (zero, zero * logarithm[0])
+    totals: tuple = (zero,) if reflectance is None else (zero, zero * reflectance.logarithm[0])
 
-    def term(index: Any, captured: Any) -> tuple:
-        (k, odd, tau), (pair, tilts, logarithm) = numbers(index), captured
-        p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
-        way = Way(k, odd, tau * p, q)
-        weight, mean = way.mean(tilts, multiple)
-        weight = weight * 2 / dr.select(odd, k + 1, k)
-        # The product varies little over the grooves: their mean stands for all.
-        return (weight,) if logarithm is None else (weight, weight * way.reflected(mean, pair.length, logarithm))
+    def with_bounces(totals: tuple, counted: tuple, nodes: int, double: bool) -> tuple:
+        count, numbers = counted
 
-    count, numbers = numbered(limits, most, first_even=4)
-    totals = accumulate(term, count, totals, (pair, tilts, logarithm))
-    twice = dr.select(most >= 2, 1, 0)
-    for tau in (1, -1):
-        weight, mean, variance = twice_reflected(pair, tau, tilts, double)
-        weight = weight * twice
-        totals = (totals[0] + weight, *totals[1:])
-        if logarithm is not None:
-            # Two nodes of the Gauss rule for the distribution of the grooves.
-            spread, way = dr.sqrt(greater(variance, 1e-12)), Way(2, False, tau * pair.delta, pair.theta)
-            ends = [way.reflected(r, pair.length, logarithm) for r in (mean - spread, mean + spread)]
-            totals = totals[0], totals[1] + 0.5 * weight * (ends[0] + ends[1])
+        def term(index: Any, captured: Any) -> tuple:
+            (k, odd, tau), (pair, tilts, e) = numbers(index), captured
+            p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
+            way, scale = Way(k, odd, tau * p, q), 2 / type(p)(dr.select(odd, k + 1, k))
+            total, first, second, *reflected = moments(way, tilts, nodes, double, e if each else [])
+            if not e or each:
+                return (scale * total, *(scale * one for one in reflected))
+            mean, square = (moment / dr.select(total > 1e-15, total, 1) for moment in (first, second))
+            if double:
+                spread = dr.sqrt(greater(square - mean * mean, 1e-12))
+                through = (way.reflected(mean - spread, e) + way.reflected(mean + spread, e)) / 2
+            else:
+                through = way.reflected(mean, e)
+            return scale * total, scale * total * through
+
+        return accumulate(term, count, totals, (pair, tilts, e))
+
+    double, multiple = nodes
+    totals = with_bounces(totals, numbered(limits, dr.minimum(most, type(most)(2))), double, True)
+    totals = with_bounces(totals, numbered(limits, most, first_even=4), multiple, False)
     return totals[-1], totals[0]
 
 
@@ -171,36 +181,14 @@ class Way:
         in_order = dr.minimum(middle, a), dr.maximum(a, dr.minimum(middle, b)), dr.maximum(middle, b)
         return low, *(dr.clip(kink, low, high) for kink in in_order), high
 
-    def mean(self, tilts: Tilts, nodes: int) -> tuple[Any, Any]:
-        """(integral of D(l) sin l D(r) sin r g' over r, mean r)."""
-
-        def at(node: Any, captured: Any) -> tuple:
-            way, tilts, low, extent, width = captured
-            tilt = low + extent * node
-            l, r = sincos(way.first_tilt(tilt)), sincos(tilt)
-            value = tilts.product(l, r) * l[0] * r[0] * width(l, r)
-            return value, value * node
-
-        low, extent = self.interval()
-        total, first = integrate(at, nodes, (self, tilts, low, extent, Width.of(self)), self.p, nested=True)
-        return total * extent, low + extent * first * dr.rcp(greater(total, 1e-15))
-
-    def reflected(self, r: Any, length: Any, logarithm: list) -> Any:
+    def reflected(self, r: Any, e: list) -> Any:
         """Product of the reflectances in the groove with this r: u = Q and w = tau P, shifted by half r - l."""
         l = self.first_tilt(r)
         turn = (r - l) / 2
-        u, w = self.q + dr.select(self.odd, 0, turn), self.p + dr.select(self.odd, turn, 0)
-        b = (dr.pi - l - r) / 2
-        (sin_u, cos_u), (sin, cos) = sincos(u), sincos(dr.select(self.k == 3, 2 * b, b))
-        few = with_partner(length * cos_u * cos, length * sin_u * sin)
-        if isinstance(self.k, int):  # two
-            return through(logarithm, few)
-        middle, powers = length * cos_u, []
-        for power in few:
-            powers.append(power + middle)
-            middle = middle * length * cos_u
-        path = Path.of(logarithm, length, sincos(w + u), sincos(w - u), dr.pi - 2 * w)
-        return dr.select(self.k == 3, through(logarithm, powers), path(b, dr.rcp(greater(b, 1e-6))))
+        u = multiples(*sincos(self.q + dr.select(self.odd, 0, turn)))
+        w = multiples(*sincos(self.p + dr.select(self.odd, turn, 0)))
+        b = multiples(*sincos((dr.pi - l - r) / 2))
+        return product(e, Fan(self.k, self.odd, numerators(u, w), [cos for _, cos in u], b))
 
 
 @dataclass
@@ -227,24 +215,26 @@ class Width:
         return dr.maximum(dr.minimum(f_1, f_k) - dr.maximum(dr.maximum(f_0, f_after), 0), 0)
 
 
-def twice_reflected(pair: Pair, tau: int, tilts: Tilts, nodes: int) -> tuple[Any, Any, Any]:
-    """(integral of D(l) sin l D(r) sin r g' over r, mean r, variance of r) for k = 2, piece by piece."""
-    way = Way(2, False, tau * pair.delta, pair.theta)
+def moments(way: Way, tilts: Tilts, nodes: int, double: bool, e: list) -> tuple:
+    """Integrals of D(l) sin l D(r) sin r g' {1, r, r^2} over r and, given `waves`, times the product of reflectances.
+
+    ``double`` tells that k = 2.
+    """
     low, extent = way.interval()
-    ends = way.kinks(low, low + extent)
+    ends = way.kinks(low, low + extent) if double else (low, low + extent)
 
     def at(node: Any, captured: Any) -> tuple:
-        (way, tilts, ends, width), sums = captured, [0, 0, 0]
+        way, tilts, ends, width, e = captured
+        sums: list = [0] * (4 if e else 3)
         for begin, end in pairwise(ends):
             tilt = begin + (end - begin) * node
             l, r = sincos(way.first_tilt(tilt)), sincos(tilt)
             weight = (end - begin) * tilts.product(l, r) * l[0] * r[0] * width(l, r)
-            sums = [sums[0] + weight, sums[1] + weight * tilt, sums[2] + weight * tilt * tilt]
+            factors = [1, tilt, tilt * tilt] + ([way.reflected(tilt, e)] if e else [])
+            sums = [total + weight * factor for total, factor in zip(sums, factors)]
         return tuple(sums)
 
-    total, first, second = integrate(at, nodes, (way, tilts, ends, Width.of(way)), way.p)
-    mean, square = (moment / dr.select(total > 1e-15, total, 1) for moment in (first, second))
-    return total, mean, square - mean * mean
+    return integrate(at, nodes, (way, tilts, ends, Width.of(way), e), way.p, nested=True)
 
 
 def _reaches(x: tuple, near: tuple, far: tuple) -> tuple[Any, Any]:

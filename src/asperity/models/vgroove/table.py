@@ -37,7 +37,7 @@ COLOURS = 40, 40, 24
 """Nodes of R, over theta, delta and the root of l."""
 FINE, COARSE = (12, 24), (6, 12)
 """Nodes of the quadrature for T and, as a quotient of two sums, for R: more than each ray can afford."""
-ROUGHEST = 1.2
+ROUGHEST = 1.5
 """Beyond this roughness steep grooves are so many that the table has errors above 1 %."""
 EDGE = 0.02
 """How far inside, in cells, the last nodes are computed: at the edges themselves all is 0 / 0."""
@@ -98,7 +98,7 @@ class Tabulated:
         if logarithm is not None:
             pair = _pairs(layout, alpha, COLOURS)
             reflectance = Reflectance(lambda cos: 1, logarithm)
-            colour, total = several(pair, tilts, bounces, reflectance, COARSE)
+            colour, total = several(pair, tilts, bounces, reflectance, COARSE, each=True)
             channels = [_fourth_root(channel / greater(total, 1e-30)) for channel in colour]
             dr.eval(channels)
             channels = [_straddled(channel, COLOURS[-1]) for channel in channels]
