@@ -45,40 +45,78 @@ def in_double(pair: Pair) -> Pair:
 
 
 @pytest.mark.parametrize("kind, alpha", CASES)
-@pytest.mark.parametrize("material", ["none", "Au", "Al"])
+@pytest.mark.parametrize("material", ["Au", "W"])
 def test_table(rgb, kind, alpha, material):
-    """Within the issue's bounds of a finer quadrature: .3 % for 99.9 % of the pairs, 1 % for all, or of 1e-3."""
-    i, o = pairs(4000)
-    most = needed_bounces_nonsymmetric(kind, alpha)
-    reflectance, logarithm, pair = None, None, Pair.of(mi.Vector3f(i), mi.Vector3f(o))
-    if material != "none":
-        metal = mi.load_dict({"type": "vgroove", "material": material}).model
-        once = metal.at("metal", dr.zeros(mi.SurfaceInteraction3f), True)
-        reflectance, logarithm = Reflectance(once, fit(once)), fit(once)
-    distribution, cos_i = kind(mi.Float(alpha), mi.Float(alpha)), mi.Float(np.float32(i[2]))
-    table = Tabulated.of(kind, alpha, most, logarithm)
-    tilts = Tilts.along(distribution, pair.cos_azimuth, pair.sin_azimuth)
-    found = table(pair, cos_i, tilts, mi.UInt32(most), reflectance)
+    """Within the bounds of issue 13 of a finer quadrature, and of the product of reflectances in each groove.
 
-    fine, number = in_double(pair), llvm.Float64
-    tilts = Tilts.along(kind(number(alpha), number(alpha)), fine.cos_azimuth, fine.sin_azimuth)
-    mirrors = np.array(several(fine, tilts, llvm.UInt(most), None, (32, 96))[1] / tilts.partner())
-    single, pole = np.array(single_bounce(fine, tilts)), np.maximum(np.array(fine.sin_theta), POLE)
-    scale = 1 / (4 * np.float64(np.float32(i[2])) * np.array(fine.cos_delta))
-    exact = [scale * (single + mirrors / pole)]
-    errors = [np.abs(np.array(found[1]) - exact[0]) / np.maximum(exact[0], 1e-3)]
-    if reflectance is not None:
-        colour, share = several(
-            pair, Tilts.along(distribution, pair.cos_azimuth, pair.sin_azimuth), mi.UInt32(most), reflectance, (12, 24)
-        )
-        ratio = np.array(colour) / np.maximum(np.array(share), 1e-30)
-        exact = scale * (single * np.array(reflectance.once(pair.length * pair.cos_delta)) + ratio * mirrors / pole)
-        errors.append((np.abs(np.array(found[0]) - exact) / np.maximum(exact, 1e-3)).max(0))
-    print(
-        kind.__name__,
-        alpha,
-        material,
-        [[float(f"{np.quantile(e, q) * 100:.2g}") for q in (0.5, 0.99, 0.999, 1)] for e in errors],
+    That is .3 %, where f > 1e-3, and 1 % at worst. There, one pair in a thousand may be beyond; here, one in 200, since
+    pairs at edges are five times as many.
+    """
+    (i, o), most = pairs(2000), needed_bounces_nonsymmetric(kind, alpha)
+    metal = mi.load_dict({"type": "vgroove", "material": material}).model
+    once = metal.at("metal", dr.zeros(mi.SurfaceInteraction3f), True)
+    reflectance, distribution = Reflectance(once, fit(once)), kind(mi.Float(alpha), mi.Float(alpha))
+    pair, cos_i = Pair.of(mi.Vector3f(i), mi.Vector3f(o)), np.float32(i[2])
+    tilts = Tilts.along(distribution, pair.cos_azimuth, pair.sin_azimuth)
+    table = Tabulated.of(kind, alpha, most, reflectance.logarithm)
+    found = table(pair, mi.Float(cos_i), tilts, mi.UInt32(most), reflectance)
+
+    colour, total = several(pair, tilts, mi.UInt32(most), reflectance, (12, 24), each=True)
+    ratio, first = np.array(colour) / np.maximum(np.array(total), 1e-30), once(pair.length * pair.cos_delta)
+    pair, number = in_double(pair), llvm.Float64
+    tilts = Tilts.along(kind(number(alpha), number(alpha)), pair.cos_azimuth, pair.sin_azimuth)
+    total = np.array(several(pair, tilts, llvm.UInt(most), None, (24, 96))[1] / tilts.partner())
+    scale = 1 / (4 * np.float64(cos_i) * np.array(pair.cos_delta))
+    single, total = scale * single_bounce(pair, tilts), scale * total / np.maximum(np.array(pair.sin_theta), POLE)
+    for value, exact in zip(found, (single * np.array(first) + total * ratio, single + total)):
+        error = np.abs(np.array(value) - exact) / np.maximum(exact, 1e-3)
+        assert np.quantile(error, 0.995) < 3e-3 and error.max() < 1e-2
+
+
+@pytest.mark.parametrize("alpha", [0.001, 0.3, 1.5])
+def test_coordinates(alpha):
+    """Nodes are where the coordinates say; ends are 0 and 1."""
+    x = np.linspace(0, 1, 41)
+    layout = Layout(alpha)
+    theta, y = np.repeat(layout.theta(x), 41), np.tile(x, 41)
+    single = Layout(llvm.Float64(alpha))
+    delta = single.delta(llvm.Float64(y), llvm.Float64(theta))
+    found = single.coordinates(llvm.Float64(theta), delta)
+    inside = theta < np.pi / 2 - 1e-5  # else there is no room for delta
+    assert np.array(found[0]) == pytest.approx(np.repeat(x, 41), abs=1e-6)
+    assert np.array(found[1])[inside] == pytest.approx(y[inside], abs=1e-6)
+
+
+def test_when_there_is_a_table(rgb):
+    """For what is constant, alike around the normal and not differentiated; anew after each change."""
+    grooves = {"type": "vgroove", "symmetric": False, "material": "Au"}
+
+    def table(**given):
+        return mi.load_dict(grooves | given).model.table.result
+
+    assert table(alpha=0.3) and table(distribution="phong", exponent=20.0)
+    assert not (table(symmetric=True) or table(alpha_u=0.3, alpha_v=0.3) or table(alpha=2.0))
+    assert not table(alpha={"type": "bitmap", "data": np.full((2, 2, 1), 0.3, np.float32), "raw": True})
+    bsdf = mi.load_dict(grooves | {"alpha": 0.3})
+    first, parameters = bsdf.model.table.result, mi.traverse(bsdf)
+    parameters["alpha.value"] = mi.Float(0.4)
+    parameters.update()
+    second = bsdf.model.table.result
+    assert second and second is not first
+    dr.enable_grad(parameters["alpha.value"])
+    parameters.update()
+    assert bsdf.model.table.result is None
+
+
+@pytest.mark.parametrize("most", [1, 2, 3])
+def test_few_bounces(rgb, most):
+    """The table knows ``max_bounces``: to the errors of both, .3 % and the quadrature's 1 %."""
+    grooves = {"type": "vgroove", "symmetric": False, "max_bounces": most}
+    i, o = (mi.Vector3f(cosine_directions(np.random.default_rng(seed), 1000)) for seed in (1, 2))
+    si = dr.zeros(mi.SurfaceInteraction3f, 1000)
+    si.wi = i
+    tabulated, integrated = (
+        mi.load_dict(grooves | alpha).pdf(mi.BSDFContext(), si, o).numpy()
+        for alpha in ({"alpha": 0.5}, {"alpha_u": 0.5, "alpha_v": 0.5})
     )
-    for error in errors:
-        assert np.quantile(error, 0.999) < 3e-3 and error.max() < 1e-2
+    assert tabulated == pytest.approx(integrated, rel=1.3e-2, abs=1e-5)
