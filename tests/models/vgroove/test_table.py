@@ -17,7 +17,7 @@ from asperity.models.vgroove.symmetric import POLE
 from asperity.models.vgroove.table import Layout, Tabulated
 from asperity.models.vgroove.tilts import Tilts
 
-CASES = [(GGX, 0.01), (GGX, 0.1), (GGX, 0.3), (GGX, 1.2), (Beckmann, 0.2), (Beckmann, 1.0), (Phong, 0.3), (Phong, 1.0)]
+CASES = [(GGX, 0.01), (GGX, 0.3), (GGX, 1.2), (Beckmann, 1.0), (Phong, 0.3)]
 
 
 def pairs(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -49,10 +49,9 @@ def in_double(pair: Pair) -> Pair:
 def test_table(rgb, kind, alpha, material):
     """Within the bounds of issue 13 of a finer quadrature, and of the product of reflectances in each groove.
 
-    That is .3 %, where f > 1e-3, and 1 % at worst. There, one pair in a thousand may be beyond; here, one in 200, since
-    pairs at edges are five times as many.
+    That is .3 %, where f > 1e-3, but for one pair in a thousand, and 1 % at worst. Of all metals tungsten bends most.
     """
-    (i, o), most = pairs(2000), needed_bounces_nonsymmetric(kind, alpha)
+    (i, o), most = pairs(1600), needed_bounces_nonsymmetric(kind, alpha)
     metal = mi.load_dict({"type": "vgroove", "material": material}).model
     once = metal.at("metal", dr.zeros(mi.SurfaceInteraction3f), True)
     reflectance, distribution = Reflectance(once, fit(once)), kind(mi.Float(alpha), mi.Float(alpha))
@@ -65,12 +64,12 @@ def test_table(rgb, kind, alpha, material):
     ratio, first = np.array(colour) / np.maximum(np.array(total), 1e-30), once(pair.length * pair.cos_delta)
     pair, number = in_double(pair), llvm.Float64
     tilts = Tilts.along(kind(number(alpha), number(alpha)), pair.cos_azimuth, pair.sin_azimuth)
-    total = np.array(several(pair, tilts, llvm.UInt(most), None, (24, 96))[1] / tilts.partner())
+    total = np.array(several(pair, tilts, llvm.UInt(most), None, (16, 48))[1] / tilts.partner())
     scale = 1 / (4 * np.float64(cos_i) * np.array(pair.cos_delta))
     single, total = scale * single_bounce(pair, tilts), scale * total / np.maximum(np.array(pair.sin_theta), POLE)
     for value, exact in zip(found, (single * np.array(first) + total * ratio, single + total)):
         error = np.abs(np.array(value) - exact) / np.maximum(exact, 1e-3)
-        assert np.quantile(error, 0.995) < 3e-3 and error.max() < 1e-2
+        assert np.quantile(error, 0.999) < 3e-3 and error.max() < 1e-2
 
 
 @pytest.mark.parametrize("alpha", [0.001, 0.3, 1.5])
@@ -82,8 +81,8 @@ def test_coordinates(alpha):
     single = Layout(llvm.Float64(alpha))
     delta = single.delta(llvm.Float64(y), llvm.Float64(theta))
     found = single.coordinates(llvm.Float64(theta), delta)
-    inside = theta < np.pi / 2 - 1e-5  # else there is no room for delta
-    assert np.array(found[0]) == pytest.approx(np.repeat(x, 41), abs=1e-6)
+    inside = theta < np.pi / 2 - 1e-5  # else there is no room for delta, less than 1e-6 of theta
+    assert np.array(found[0]) == pytest.approx(np.repeat(x, 41), abs=1e-6 / alpha)
     assert np.array(found[1])[inside] == pytest.approx(y[inside], abs=1e-6)
 
 
@@ -96,7 +95,7 @@ def test_when_there_is_a_table(rgb):
 
     assert table(alpha=0.3) and table(distribution="phong", exponent=20.0)
     assert not (table(symmetric=True) or table(alpha_u=0.3, alpha_v=0.3) or table(alpha=2.0))
-    assert not table(alpha={"type": "bitmap", "data": np.full((2, 2, 1), 0.3, np.float32), "raw": True})
+    assert not table(alpha={"type": "bitmap", "bitmap": mi.Bitmap(np.full((2, 2, 1), 0.3, np.float32)), "raw": True})
     bsdf = mi.load_dict(grooves | {"alpha": 0.3})
     first, parameters = bsdf.model.table.result, mi.traverse(bsdf)
     parameters["alpha.value"] = mi.Float(0.4)

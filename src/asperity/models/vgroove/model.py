@@ -157,7 +157,8 @@ class VGroove(LobeModel):
         """Make the table, anew if something changed, where there is one: else quadrature takes its place."""
         roughness = self.exponent if self.alpha is None else self.alpha.textures.get("alpha")
         constant = roughness is not None and settled(roughness) and (self.metal.mirror or self.logarithm is not None)
-        if self.symmetric or not (constant and dr.is_jit_v(mi.Float)) or (alpha := self._roughest()) > TABULATED:
+        alpha = self._roughest() if constant and dr.is_jit_v(mi.Float) and not self.symmetric else None
+        if alpha is None or alpha > TABULATED:
             self.table = Made()
             return
         shown = [] if self.logarithm is None else [number for term in self.logarithm for number in np.ravel(term)]

@@ -33,7 +33,7 @@ from .tilts import TILTS, Tilts
 HALF = np.pi / 2
 ANGLES = 128, 128
 """Nodes of T, over theta and delta."""
-COLOURS = 40, 40, 24
+COLOURS = 24, 72, 24
 """Nodes of R, over theta, delta and the root of l."""
 FINE, COARSE = (12, 24), (6, 12)
 """Nodes of the quadrature for T and, as a quotient of two sums, for R: more than each ray can afford."""
@@ -114,7 +114,7 @@ class Tabulated:
         pole, scale = reciprocals(greater(pair.sin_theta, POLE), 4 * cos_i * pair.cos_delta)
         single = scale * single_bounce(pair, tilts)
         total = pole * scale * pair.cos_delta * _horizons(pair) * total
-        if reflectance is None:
+        if reflectance is None or self.metal is None:
             return single + total, single + total
         once = reflectance.once(pair.length * pair.cos_delta)
         colour = [_fourth_power(root) for root in self.metal.at(*x, dr.sqrt(pair.length))]
