@@ -13,7 +13,7 @@ from asperity.microfacet.distributions import GGX, Beckmann
 from asperity.microfacet.quadrature import gauss_legendre
 from asperity.models.vgroove import nonsymmetric
 from asperity.models.vgroove.bounces import needed_bounces_nonsymmetric
-from asperity.models.vgroove.kaleidoscope import Pair
+from asperity.models.vgroove.kaleidoscope import Groove, Pair, bounces, entrance, exit_angle
 from asperity.models.vgroove.tilts import Tilts
 
 
@@ -30,7 +30,7 @@ def test_nonsymmetric_quadrature(monkeypatch, kind, alpha):
         monkeypatch.setitem(nonsymmetric.NODES, kind, nodes)
         return np.asarray(nonsymmetric.nonsymmetric(pair, i.z, tilts, most, None)[1])
 
-    default, fine, exact = value(nonsymmetric.NODES[kind]), value((32, 16, 48)), value((64, 32, 200))
+    default, fine, exact = value(nonsymmetric.NODES[kind]), value((16, 48)), value((32, 200))
     default, fine, exact = (one[exact > 1e-3] for one in (default, fine, exact))
     assert np.abs(fine / exact - 1).mean() < 1e-4
     error = np.abs(default / exact - 1)
@@ -55,3 +55,22 @@ def test_two_bounces_are_smooth_between_their_kinks():
     pieces = sum(integral(begin, end - begin, *gauss_legendre(8)) for begin, end in pairwise(ends))
     even = integral(low, extent, (np.arange(steps) + 0.5) / steps, np.full(steps, 1 / steps))
     assert np.abs(pieces - even).max() < 3 * (np.pi / 2 / steps) ** 2 / 8 and (even > 0.01).mean() > 0.2
+
+
+def test_ways():
+    """The closed form is the kaleidoscope's own search, in double precision but for the fast functions' 1e-6 a bounce.
+
+    Rays that meet a rim to that precision, a few in a million, may bounce once more or less.
+    """
+    rng, n, most = np.random.default_rng(6), 100_000, llvm.UInt(40)
+    slopes = [rng.uniform(0.05, 1.5, n) * np.tan(1.57 * rng.random(n)) for _ in range(2)]
+    l, r, psi, u = (llvm.Float64(x) for x in (*np.arctan(slopes), np.arcsin(rng.uniform(-1, 1, n)), rng.random(n)))
+    offset, swap = entrance(groove := Groove(l, r), psi, u)
+    groove, turned = groove.swapped(swap), dr.select(swap, -psi, psi)
+    k = bounces(groove, turned, offset, most)
+    tilts = [dr.sincos(angle) for angle in (psi, l, r)]
+    found_swap, found_k, exits = nonsymmetric.nonsymmetric_way(*tilts, u, most)
+    same = np.array(k) == np.array(found_k)
+    assert np.array_equal(np.array(swap), np.array(found_swap)) and (~same).sum() <= 3
+    error = np.abs(np.array(exits) - np.array(dr.sincos(exit_angle(groove, turned, k)))).max(0)
+    assert (error / np.array(k))[same & (np.array(k) <= 40)].max() < 2e-6

@@ -19,13 +19,15 @@ from ...microfacet.distributions import DISTRIBUTIONS, Distribution
 from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
 from ...microfacet.tables import Made
-from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers
+from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Reflectance, fit, fit_constant
-from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, polar, symmetric_way
+from .kaleidoscope import Pair, polar, symmetric_way
 from .microgeometry import ExplicitGrooves
-from .nonsymmetric import nonsymmetric
+from .nonsymmetric import nonsymmetric, nonsymmetric_way
 from .symmetric import WRITTEN, symmetric
+from .table import ROUGHEST as TABULATED
+from .table import Tabulated
 from .terms import ROUGHEST, by_terms
 from .tilts import Tilts
 
@@ -75,7 +77,7 @@ class VGroove(LobeModel):
     def configure(self, given: set[str]) -> None:
         """Settle which of the roughnesses is used."""
         conflict({"alpha", "alpha_u", "alpha_v"} & given, {"exponent"} & given)
-        self.isotropic, self.fits = self.alpha.isotropic, Made()
+        self.isotropic, self.fits, self.table = self.alpha.isotropic, Made(), Made()
         if "exponent" in given:
             self.alpha = None
         self.check()
@@ -115,6 +117,7 @@ class VGroove(LobeModel):
             self.fits.clear()
         else:
             self.fits.update(lambda *_: fit_constant(metal), *metal.eta, *metal.k)
+        self._tabulate(most)
 
     def flags(self) -> list[int]:
         """One glossy lobe."""
@@ -126,7 +129,7 @@ class VGroove(LobeModel):
         if not self.metal.mirror:
             once = self.at("metal", si, active)
             reflectance = Reflectance(once, *(self.fits.result or (fit(once), None)))
-        brdf = nonsymmetric
+        brdf = self.table.result or nonsymmetric
         if self.symmetric:
             brdf = by_terms if self.rough else partial(symmetric, few=self.few)
         return [GrooveLobe(self.kind(*self._alphas(si, active)), brdf, self.symmetric, self.most, reflectance)]
@@ -151,6 +154,18 @@ class VGroove(LobeModel):
         if self.alpha is None:
             alphas = np.sqrt(2 / (np.maximum(alphas, 0) + 2))
         return float(np.clip(alphas.max(), SMOOTHEST, min(type(self).alpha.high, self.kind.largest)))
+
+    def _tabulate(self, most: int) -> None:
+        """Make the table, anew if something changed, where there is one: else quadrature takes its place."""
+        roughness = self.exponent if self.alpha is None else self.alpha.textures.get("alpha")
+        constant = roughness is not None and settled(roughness) and (self.metal.mirror or self.fits.result is not None)
+        alpha = self._roughest() if constant and dr.is_jit_v(mi.Float) and not self.symmetric else None
+        if alpha is None or alpha > TABULATED:
+            self.table.clear()
+            return
+        logarithm, _ = self.fits.result or (None, None)
+        constants = alpha, most, *(self.fits.constants or ())
+        self.table.update(lambda *_: Tabulated.of(self.kind, alpha, most, logarithm), *constants)
 
 
 @dataclass
@@ -186,12 +201,8 @@ class GrooveLobe(Lobe):
         if self.symmetric:
             swap, k, (sin, cos) = symmetric_way((sin_psi, cos_psi), tilt, u, self.most)
         else:
-            groove = Groove(dr.atan2(*tilt), dr.atan2(*tilts.sample_partner(*more_numbers(u, v.x, v.y))))
-            psi = dr.atan2(sin_psi, cos_psi)
-            offset, swap = entrance(groove, psi, u)
-            groove, psi = groove.swapped(swap), dr.select(swap, -psi, psi)
-            k = bounces(groove, psi, offset, self.most)
-            sin, cos = dr.sincos(exit_angle(groove, psi, k))
+            partner = tilts.sample_partner(*more_numbers(u, v.x, v.y))
+            swap, k, (sin, cos) = nonsymmetric_way((sin_psi, cos_psi), tilt, partner, u, self.most)
         x, y = dr.select(swap, -x, x), dr.select(swap, -y, y)
         along = wi.y * x - wi.x * y  # across the plane of the kaleidoscope; turns round
         return direction(length * sin * x + along * y, length * sin * y - along * x, length * cos), k

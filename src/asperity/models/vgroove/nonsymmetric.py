@@ -25,14 +25,16 @@ from typing import Any
 import drjit as dr
 
 from ...microfacet.distributions import GGX, Beckmann, Phong
+from ...microfacet.fast import angles, greater, lesser, reciprocals, sincos
+from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import accumulate, integrate
 from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
 from .kaleidoscope import Pair
 from .symmetric import POLE, numbered
 from .tilts import Tilts
 
-NODES = {GGX: (6, 4, 5), Beckmann: (12, 4, 8), Phong: (12, 4, 8)}
-"""For k = 1 and k = 2, in each piece between kinks, and for all others, whose share is small.
+NODES = {GGX: (4, 5), Beckmann: (4, 8), Phong: (4, 8)}
+"""For k = 2, in each piece between kinks, and for all others, whose share is small.
 
 A density has to be exact to .05 % or so: what its integral misses looks like lost samples. Tails of GGX are smoother.
 """
@@ -40,37 +42,67 @@ A density has to be exact to .05 % or so: what its integral misses looks like lo
 
 def nonsymmetric(pair: Pair, cos_i: Any, tilts: Tilts, most: Any, reflectance: Reflectance | None) -> tuple[Any, Any]:
     """(f cos_o, the same of mirrors) of at most ``most`` bounces; equal if ``reflectance`` is None."""
-    pole = dr.rcp(dr.maximum(pair.sin_theta, POLE))
-    captured = pair, tilts, pole, [] if reflectance is None else waves(reflectance.logarithm, pair.length)
+    once = 1 if reflectance is None else reflectance.once(pair.length * pair.cos_delta)
+    colour, mirrored = several(pair, tilts, most, reflectance, NODES[tilts.distribution])
+    pole, scale = reciprocals(greater(pair.sin_theta, POLE), 4 * cos_i * pair.cos_delta)
+    single, pole = scale * single_bounce(pair, tilts), pole * scale / tilts.partner()
+    return single * once + pole * colour, single + pole * mirrored
+
+
+def single_bounce(pair: Pair, tilts: Tilts) -> Any:
+    """4 cos_i cos delta times f cos_o of mirrors after one bounce, from a facet whose normal is the half vector.
+
+    What x, the steeper direction, sees of it is cos delta; or, if the partner's tilt r is more than pi/2 - x, which
+    leaves it partly in shadow, cos x sin(theta + r) / sin r. Its mean over partners is closed.
+    """
+    sin_x = pair.sin_theta * pair.cos_delta + pair.cos_theta * pair.sin_delta
+    cos_x = greater(pair.cos_theta * pair.cos_delta - pair.sin_theta * pair.sin_delta, 0)
+    flatter, steeper = tilts.partners(cos_x, sin_x)
+    seen = flatter * pair.cos_delta + cos_x * ((1 - flatter) * pair.cos_theta + steeper * pair.sin_theta)
+    return tilts.density(pair.sin_theta, pair.cos_theta) * seen
+
+
+def several(
+    pair: Pair,
+    tilts: Tilts,
+    most: Any,
+    reflectance: Reflectance | None,
+    nodes: tuple[int, int],
+    each: bool = False,
+) -> tuple[Any, Any]:
+    """4 cos_i cos delta sin theta C times (f cos_o, the same of mirrors) of two bounces and more, by these `NODES`.
+
+    The product of reflectances varies little over the grooves: it is that at their mean r or, for two bounces, at the
+    two nodes of the Gauss rule for their distribution; or ``each`` groove has its own, at ten times the cost.
+    """
+    e = [] if reflectance is None else waves(reflectance.logarithm, pair.length)
+    zero, limits = dr.zeros(type(pair.theta)), bounce_limits_nonsymmetric(pair)
+    totals: tuple = (zero,) if reflectance is None else (zero, zero * reflectance.logarithm[0])
 
     def with_bounces(totals: tuple, counted: tuple, nodes: int, double: bool) -> tuple:
         count, numbers = counted
 
         def term(index: Any, captured: Any) -> tuple:
-            (k, odd, tau), (pair, tilts, pole, e) = numbers(index), captured
+            (k, odd, tau), (pair, tilts, e) = numbers(index), captured
             p, q = dr.select(odd, pair.theta, pair.delta), dr.select(odd, pair.delta, pair.theta)
-            way = Way(k, odd, tau * p, q)
-            weight, mean, variance = moments(way, tilts, nodes, double)
-            weight = weight * 2 * pole / dr.select(odd, k + 1, k)
-            if not e:
-                return (weight,)
-            # The product varies little over the grooves: one node, or two, of the Gauss rule for their distribution.
-            if not double:
-                return weight, weight * way.reflected(mean, e)
-            spread = dr.sqrt(dr.maximum(variance, 1e-12))
-            return weight, weight / 2 * (way.reflected(mean - spread, e) + way.reflected(mean + spread, e))
+            way, scale = Way(k, odd, tau * p, q), 2 / type(p)(dr.select(odd, k + 1, k))
+            total, first, second, *reflected = moments(way, tilts, nodes, double, e if each else [])
+            if not e or each:
+                return (scale * total, *(scale * one for one in reflected))
+            mean, square = (moment / dr.select(total > 1e-15, total, 1) for moment in (first, second))
+            if double:
+                spread = dr.sqrt(greater(square - mean * mean, 1e-12))
+                through = (way.reflected(mean - spread, e) + way.reflected(mean + spread, e)) / 2
+            else:
+                through = way.reflected(mean, e)
+            return scale * total, scale * total * through
 
-        return accumulate(term, count, totals, captured)
+        return accumulate(term, count, totals, (pair, tilts, e))
 
-    few, double, multiple = NODES[tilts.distribution]
-    single, limits = _single(pair, tilts, few), bounce_limits_nonsymmetric(pair)
-    totals: tuple = (single,)
-    if reflectance is not None:
-        totals = single, single * reflectance.once(pair.length * pair.cos_delta)
+    double, multiple = nodes
     totals = with_bounces(totals, numbered(limits, dr.minimum(most, type(most)(2))), double, True)
     totals = with_bounces(totals, numbered(limits, most, first_even=4), multiple, False)
-    scale = dr.rcp(4 * cos_i * pair.cos_delta * tilts.partner())
-    return scale * totals[-1], scale * totals[0]
+    return totals[-1], totals[0]
 
 
 def bounce_limits_nonsymmetric(pair: Pair) -> tuple:
@@ -97,30 +129,6 @@ def bounce_limits_nonsymmetric(pair: Pair) -> tuple:
         return (dr.pi - 2 * tau * delta) / dr.maximum(below, 1e-6)
 
     return odd(1), odd(-1), even(1), even(-1)
-
-
-def _single(pair: Pair, tilts: Tilts, nodes: int) -> Any:
-    """The integral of a single bounce, from a facet whose normal is the half vector.
-
-    Over t with tan r = alpha tan t, in which D varies evenly, and on either side of the tilt that begins to shade.
-    """
-    l, x = (pair.sin_theta, pair.cos_theta), dr.sincos(pair.theta + pair.delta)
-    shade = dr.atan2(x[1], tilts.alpha * x[0])
-
-    def at(node: Any, captured: Any) -> tuple:
-        total, (tilts, l, x, shade) = 0, captured
-        alpha = tilts.alpha
-        for low, high in ((0, shade), (shade, dr.pi / 2)):
-            sin, cos = dr.sincos(low + (high - low) * node)
-            stretch = dr.rsqrt(dr.square(alpha * sin) + dr.square(cos))
-            r = alpha * sin * stretch, cos * stretch
-            f_0, f_1 = _reaches(x, l, r)
-            weight = tilts.density(*r) * r[0] * dr.maximum(f_1 - dr.maximum(f_0, 0), 0)
-            total = total + (high - low) * alpha * dr.square(stretch) * weight
-        return (total,)
-
-    (integral,) = integrate(at, nodes, (tilts, l, x, shade), pair.theta)
-    return tilts.density(*l) * integral
 
 
 @dataclass
@@ -177,9 +185,9 @@ class Way:
         """Product of the reflectances in the groove with this r: u = Q and w = tau P, shifted by half r - l."""
         l = self.first_tilt(r)
         turn = (r - l) / 2
-        u = multiples(*dr.sincos(self.q + dr.select(self.odd, 0, turn)))
-        w = multiples(*dr.sincos(self.p + dr.select(self.odd, turn, 0)))
-        b = multiples(*dr.sincos((dr.pi - l - r) / 2))
+        u = multiples(*sincos(self.q + dr.select(self.odd, 0, turn)))
+        w = multiples(*sincos(self.p + dr.select(self.odd, turn, 0)))
+        b = multiples(*sincos((dr.pi - l - r) / 2))
         return product(e, Fan(self.k, self.odd, numerators(u, w), [cos for _, cos in u], b))
 
 
@@ -197,7 +205,7 @@ class Width:
     @classmethod
     def of(cls, way: Way) -> Width:
         """That of a way."""
-        return cls(way.odd, dr.sincos(way.p + way.q), dr.sincos(way.p - way.q))
+        return cls(way.odd, sincos(way.p + way.q), sincos(way.p - way.q))
 
     def __call__(self, l: tuple, r: tuple) -> Any:
         """For (sin l, cos l) and (sin r, cos r)."""
@@ -207,23 +215,28 @@ class Width:
         return dr.maximum(dr.minimum(f_1, f_k) - dr.maximum(dr.maximum(f_0, f_after), 0), 0)
 
 
-def moments(way: Way, tilts: Tilts, nodes: int, double: bool) -> tuple[Any, Any, Any]:
-    """(integral of D(l) sin l D(r) sin r g' over r, mean r, variance of r); ``double`` tells that k = 2."""
+def moments(way: Way, tilts: Tilts, nodes: int, double: bool, e: list) -> tuple:
+    """Integrals of D(l) sin l D(r) sin r g' {1, r, r^2} over r and, given `waves`, times the product of reflectances.
+
+    ``double`` tells that k = 2.
+    """
     low, extent = way.interval()
     ends = way.kinks(low, low + extent) if double else (low, low + extent)
 
     def at(node: Any, captured: Any) -> tuple:
-        (way, tilts, ends, width), sums = captured, [0, 0, 0]
+        way, tilts, ends, width, e = captured
+        sums: list = [0] * (4 if e else 3)
         for begin, end in pairwise(ends):
             tilt = begin + (end - begin) * node
-            l, r = dr.sincos(way.first_tilt(tilt)), dr.sincos(tilt)
-            weight = (end - begin) * tilts.density(*l) * l[0] * tilts.density(*r) * r[0] * width(l, r)
-            sums = [sums[0] + weight, sums[1] + weight * tilt, sums[2] + weight * tilt * tilt]
+            l, r = sincos(way.first_tilt(tilt)), sincos(tilt)
+            weight = (end - begin) * tilts.product(l, r) * l[0] * r[0] * width(l, r)
+            factors = [1, tilt, tilt * tilt] + ([way.reflected(tilt, e)] if e else [])
+            sums = [total + weight * factor for total, factor in zip(sums, factors)]
         return tuple(sums)
 
-    total, first, second = integrate(at, nodes, (way, tilts, ends, Width.of(way)), way.p, nested=True)
-    mean, square = (moment / dr.select(total > 1e-15, total, 1) for moment in (first, second))
-    return total, mean, square - mean * mean
+    # A few nodes are a third faster as copies, which a plain number stands for.
+    like = way.p if double or e else 0.0
+    return integrate(at, nodes, (way, tilts, ends, Width.of(way), e), like, nested=True)
 
 
 def _reaches(x: tuple, near: tuple, far: tuple) -> tuple[Any, Any]:
@@ -234,3 +247,31 @@ def _reaches(x: tuple, near: tuple, far: tuple) -> tuple[Any, Any]:
     """
     (sin_x, cos_x), (sin_near, cos_near), (sin_far, cos_far) = x, near, far
     return -sin_near * (cos_x * cos_far - sin_x * sin_far), sin_far * (cos_x * cos_near + sin_x * sin_near)
+
+
+def nonsymmetric_way(psi: tuple, tilt: tuple, partner: tuple, u: Any, most: Any) -> tuple[Any, Any, tuple]:
+    """(swap, k, exit): `entrance`, `bounces` and `exit_angle` in closed form; angles are sines and cosines.
+
+    At the image m of a facet the ray is at the angle x_m, which grows by twice the aperture from one image of the facet
+    to its next; it reflects if sin x_m is more than its offset from the apex times the sine of the facet's tilt. Since
+    the rims are corners of a convex polygon, it leaves where that is so no more for the first time: beyond pi/2, but
+    for the image 2, whose rim may be nearer than that of 1.
+    """
+    (sin_psi, cos_psi), (sin_l, cos_l), (sin_r, cos_r) = psi, tilt, partner
+    left, right = cos_psi * cos_l + sin_psi * sin_l, cos_psi * cos_r - sin_psi * sin_r
+    inverse_l, inverse_r = reciprocals(greater(sin_l, 1e-10), greater(sin_r, 1e-10))
+    offsets = [dr.lerp(left * sin * inverse_l, -right * sin * inverse_r, u) for sin in (sin_l, sin_r)]
+    swap = offsets[0] < 0
+    sines = [lesser(dr.abs(dr.select(swap, a, b)), 1) for a, b in (offsets[::-1], offsets)]
+    cosines = [dr.sqrt((1 - sin) * (1 + sin)) for sin in sines]
+    size, l, r, first, second = angles((cos_psi, dr.abs(sin_psi)), (cos_l, sin_l), (cos_r, sin_r), *zip(cosines, sines))
+    psi = dr.select((sin_psi < 0) ^ swap, -size, size)
+    aperture = greater(dr.pi - l - r, 1e-6)
+    l = dr.select(swap, r, l)
+    x = psi + dr.pi / 2 - l
+    inverse = dr.rcp(2 * aperture)
+    even = 2 * greater(dr.floor((dr.pi - first - x) * inverse) + 1, 1)  # bounces before an image of L is missed
+    odd = 2 * greater(dr.floor((dr.pi - second - x + aperture) * inverse) + 1, 1) - 1  # before one of R
+    k = lesser(dr.select(x + aperture < second, 1, lesser(even, odd)), type(u)(most) + 1)
+    last = dr.select(k - 2 * dr.floor(k / 2) > 0.5, 2 * l - psi - (k - 1) * aperture, psi - dr.pi + k * aperture)
+    return swap, k, sincos(clamp(last, -dr.pi / 2, dr.pi / 2))
