@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from ...microfacet.fast import greater, lesser, polynomial
+from ...microfacet.fast import exp_of_moderate, greater, lesser, polynomial
 from ...microfacet.numerics import clamp, keep
 
 GRAZING = 1e-4
@@ -75,9 +75,11 @@ BOND_ALBEDO: Table = ((1, 0.0889736, -0.0481792, -0.0303401), (1, 1.0105177, -0.
 ISOTROPIC_ROOT: Table = ((1, 1.9115577, 0.72979103, 0.0055024459), (1, 3.3557257, 3.2437232, 0.8225901))
 ISOTROPIC_BOND_ALBEDO: Table = ((1, 0.87528568, 0.16378542, -0.00030203756), (1, 2.1846868, 1.4920327, 0.30637573))
 """Numerator and denominator of the functions of these names."""
-LOGARITHM: Table = ((-0.020548442, 0.68623806, 5.3571373, -10.15711, 4.895048, 0.71903633, -0.78666411),)
-"""mu log(1 + 1 / mu) over sqrt(mu), as a polynomial in mu^(1/4), from GRAZING on: absolute error 1e-5, of the product."""
-ONCE: Table = ((0.9428100525, 0.04709340554, 0.007922266094, 0.0008930864792, 0.001280117159),)
+LOGARITHM: Table = (
+    (-0.02054921058, 0.6862471607, 5.357096823, -10.15702137, 4.894946201, 0.7190951803, -0.7866775426),
+)
+"""mu log(1 + 1 / mu) over sqrt(mu), as a polynomial in mu^(1/4), from GRAZING on: the product errs by 1e-5."""
+ONCE: Table = ((0.9428100524, 0.0470934052, 0.007922268521, 0.0008930825907, 0.001280119134),)
 """(sin x - x cos x) / y^(3/2), as a polynomial in y = 1 - cos x in [0, 1]: relative error 1.1e-6."""
 INVERSE: Table = ((2.08307335, -0.0772235339, 0.0236680126, -0.0294406505),)
 """(1 - cos) / y of `invert_phase`, as a polynomial in y = (1 - u)^(2/5): absolute error of cos 8e-5."""
@@ -224,17 +226,12 @@ def features(mu: Any) -> tuple[Any, ...]:
     return log, mu, log * mu, mu * mu
 
 
-def exp(x: Any) -> Any:
-    """exp for |x| < 3, as logarithms of products of two H are: relative error 2e-5 at 3, 1e-6 below 1.8."""
-    power = polynomial(x * (1 / 16), (1, 1, 1 / 2, 1 / 6, 1 / 24))
-    for _ in range(4):
-        power = power * power
-    return power
-
-
 def log_h(features: Iterable[Any], s: Any, table: Table) -> Any:
     """Logarithm of H(mu). Of the sum of the features of two directions, that of H(u) H(v)."""
-    return (1 - s * s) * sum(f * polynomial(s, row) for f, row in zip(features, table))
+    total = 0
+    for feature, row in zip(features, table):
+        total = dr.fma(feature, polynomial(s, row), total)
+    return (1 - s * s) * total
 
 
 # BRDFs. With p3 = 1 - 4/3 P1 + 5/16 P2 for phase function, the half space reflects f0 + f1 cos(phi) + f2 cos(2 phi)
@@ -246,27 +243,10 @@ def accurate(pair: Directions, s: Any) -> Any:
 
     Relative error .04 to .07 % rms for c >= .2; 2 % at most, where both directions are at 89.5 degrees.
     """
-    return Fits.of(s)(pair)
-
-
-class Fits(NamedTuple):
-    """All that `accurate` needs of s: made once where that is the same everywhere."""
-
-    h: tuple[Any, ...]  # c times the polynomials in s of H0, H1, H2
-    factors: Factors
-
-    @classmethod
-    def of(cls, s: Any) -> Fits:
-        """Those of a spectrum or number ``s``."""
-        c = 1 - s * s
-        rows = [[c * polynomial(s, row) for row in table] for table in (H0, H1, H2, CONSTANTS)]
-        return cls(tuple(rows[:3]), Factors.of(c, *rows[3]))
-
-    def __call__(self, pair: Directions) -> Any:
-        """The BRDF."""
-        both = [a + b for a, b in zip(features(pair.u), features(pair.v))]
-        x0, x1, x2 = (sum(f * factor for f, factor in zip(both, row)) for row in self.h)
-        return _modes(pair, self.factors, exp(x0), exp(x1), x2 + x2 * x2 / 2)
+    c, both = 1 - s * s, tuple(a + b for a, b in zip(features(pair.u), features(pair.v)))
+    h0, h1 = (exp_of_moderate(log_h(both, s, table)) for table in (H0, H1))
+    x = log_h(both, s, H2)
+    return _modes(pair, c, h0, h1, x + x * x / 2, [c * polynomial(s, row) for row in CONSTANTS])
 
 
 def published(pair: Directions, s: Any) -> Any:
@@ -287,7 +267,7 @@ def published(pair: Directions, s: Any) -> Any:
         )
     ]
     constants += [-c * (0.0589037 + 0.00473696 * c), 0.44038 * c]  # Eqs. 26 and 27
-    return clamp(_modes(pair, Factors.of(c, *constants), h0, h1, 0), 0, dr.inf)
+    return clamp(_modes(pair, c, h0, h1, 0, constants), 0, dr.inf)
 
 
 def fast(pair: Directions, s: Any) -> Any:
@@ -306,7 +286,7 @@ def fast(pair: Directions, s: Any) -> Any:
 def isotropic(pair: Directions, s: Any) -> Any:
     """Isotropic scatterers (Chandrasekhar 1960): c H(u) H(v) / (4 pi (u + v)). Relative error 1e-3."""
     both = (a + b for a, b in zip(features(pair.u), features(pair.v)))
-    return (1 - s * s) * exp(log_h(both, s, ISOTROPIC)) / (4 * dr.pi * (pair.u + pair.v))
+    return (1 - s * s) * exp_of_moderate(log_h(both, s, ISOTROPIC)) / (4 * dr.pi * (pair.u + pair.v))
 
 
 def _once(pair: Directions) -> Any:
@@ -314,35 +294,21 @@ def _once(pair: Directions) -> Any:
     return fast_phase(-pair.q - pair.u * pair.v)
 
 
-class Factors(NamedTuple):
-    """What `_modes` needs of s, for unit sums."""
-
-    c: Any
-    mode0: tuple[Any, ...]  # A to F over 2 pi
-    mode1: tuple[Any, Any]  # l, and l^2 + 45 / 64 m
-
-    @classmethod
-    def of(cls, c: Any, b: Any, c_: Any, d: Any, f: Any, l: Any, m_1: Any) -> Factors:
-        """From c and what `CONSTANTS` has, with A and E of Eq. 33."""
-        a, e = 69 / 128 * c, 15 / 128 * (1 - c) * c * (4 / 3 * c + 3)
-        return cls(c, tuple(x / (2 * dr.pi) for x in (a, b, c_, d, e, f)), (l, l * l + 45 / 64 * (1 + m_1)))
-
-
-def _modes(pair: Directions, factors: Factors, h0: Any, h1: Any, h2: Any) -> Any:
+def _modes(pair: Directions, c: Any, h0: Any, h1: Any, h2: Any, constants: Sequence[Any]) -> Any:
     """Exact single scattering (Eq. 10), mode 0 (Eqs. 30, 33, 38), mode 1 (Eqs. 22, 28, doubled) and mode 2.
 
-    ``h0`` and ``h1`` are H(u) H(v), ``h2`` is H(u) H(v) - 1; mode 2 is that of p3, exactly.
+    ``h0`` and ``h1`` are H(u) H(v), ``h2`` is H(u) H(v) - 1; mode 2 is that of p3, exactly. ``constants``: see
+    CONSTANTS. u^2 + v^2 is (u + v)^2 - 2 u v, which makes everything a polynomial in sum and product.
     """
-    total, product, q = pair.u + pair.v, pair.u * pair.v, pair.q
-    squares, product2 = total * total - 2 * product, product * product
-    a, b, c_, d, e, f = factors.mode0
-    mode0 = h0 * (a + b * total + product * (c_ + d * total) + e * product2 + f * squares)
-    mode1 = h1 * (1 + factors.mode1[0] * total + factors.mode1[1] * product) * (q / (3 * dr.pi))
-    mode2 = h2 * ((2 * q * q - pair.sin2) * (15 / (256 * dr.pi)))
-    # What modes 0 and 1 have of single scattering.
-    single = (135 * product2 - 45 * squares + 256 * product + 207) / (768 * dr.pi)
-    single = single + (45 * product + 64) * q / (192 * dr.pi)
-    return (factors.c * (_once(pair) - single + mode1 + mode2) + mode0) / total
+    (b, c_, d, f, l, m_1), total, product = constants, pair.u + pair.v, pair.u * pair.v
+    a, e = 69 / 128 * c, 15 / 128 * (1 - c) * c * (4 / 3 * c + 3)
+    many0 = polynomial(product, (polynomial(total, (a, b, f)), polynomial(total, (c_ - 2 * f, d)), e))
+    once0 = polynomial(product, (polynomial(total, (207, 0, -45)), 256 + 2 * 45, 135))
+    many1 = polynomial(product, (polynomial(total, (1, l)), l * l + 45 / 64 * (1 + m_1)))
+    once1 = polynomial(product, (64, 45))
+    mode1 = pair.q * (h1 * many1 / (3 * dr.pi) - once1 / (192 * dr.pi))
+    mode2 = h2 * ((2 * dr.square(pair.q) - pair.sin2) * (15 / (256 * dr.pi)))
+    return (h0 * many0 / (2 * dr.pi) + c * (_once(pair) - once0 / (768 * dr.pi) + mode1 + mode2)) / total
 
 
 def _published_h0(mu: Any, c: Any, s: Any) -> Any:
