@@ -7,6 +7,7 @@ import pytest
 from asperity.conductors import Conductor, artist_friendly, materials
 from asperity.errors import ParameterError
 from asperity.lab import evaluate
+from asperity.microfacet.fresnel import FittedMetal
 from asperity.models import MODELS
 from asperity.models.micrograin import Micrograin
 from asperity.parameters import Axes, Choice, Constant, ConstantAxes, Declared, Texture, Usual
@@ -126,6 +127,20 @@ def test_artist_friendly_metal_reflects_what_was_asked(rgb, reflectivity, edge_t
     eta, k = artist_friendly(mi.Float(reflectivity), mi.Float(edge_tint))
     at_normal = mi.fresnel_conductor(mi.Float(1), mi.Complex2f(eta, k))
     assert at_normal[0] == pytest.approx(reflectivity, abs=2e-5)  # float32: eta and k reach 40 at the edges
+
+
+def test_a_metal_is_fitted_once_where_it_is_settled(rgb):
+    bsdf = mi.load_dict({"type": "micrograin", "eta": 0.2, "k": 3.0})
+    before, params = bsdf.model.metal.fitted, mi.traverse(bsdf)
+    params["k.value"] = 4.0
+    params.update()
+    assert isinstance(before, FittedMetal) and before.k[0] == 3 and bsdf.model.metal.fitted.k[0] == 4
+    dr.enable_grad(params["k.value"])
+    params.update()
+    assert bsdf.model.metal.fitted is None
+    assert mi.load_dict({"type": "micrograin", "eta": bitmap(0.2, 0.3), "k": 3.0}).model.metal.fitted is None
+    mi.set_variant("llvm_ad_spectral")  # rays choose the wavelengths
+    assert mi.load_dict({"type": "micrograin", "eta": 0.2, "k": 3.0}).model.metal.fitted is None
 
 
 @pytest.mark.parametrize("given", [0, -3, 1001, 2.0, True, "two"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,9 +13,9 @@ import drjit as dr
 import mitsuba as mi
 
 from .errors import ParameterError, suggestion
-from .microfacet.fresnel import Metal, mirror
+from .microfacet.fresnel import Metal, fitted, mirror
 from .microfacet.numerics import clamp, keep
-from .parameters import Colour, Parameter, Row, Spectrum, Usual
+from .parameters import Colour, Parameter, Row, Spectrum, Usual, settled
 
 ETA = Spectrum("", low=1e-3, high=100.0, usually=Usual(0.1, 10, logarithmic=True))
 K, TINT = Spectrum("", high=100.0, usually=Usual(0.1, 10, logarithmic=True)), Colour("")
@@ -31,6 +31,17 @@ class Complex:
     k: Any = None
     reflectivity: Any = None
     edge_tint: Any = None
+    fitted: Metal | None = None  # if it is the same everywhere
+
+    def textures(self) -> dict[str, Any]:
+        """Those of the chosen way, by name."""
+        return {name: getattr(self, name) for name in PARTS if getattr(self, name) is not None}
+
+    def updated(self) -> Complex:
+        """The same, with the fit that belongs to what its textures hold now."""
+        if self.mirror or not settled(*self.textures().values()):
+            return replace(self, fitted=None)
+        return replace(self, fitted=fitted(self._metal(dr.zeros(mi.SurfaceInteraction3f), True)))
 
     @property
     def mirror(self) -> bool:
@@ -41,6 +52,9 @@ class Complex:
         """Fresnel's reflectance at a surface point, a function of the cosine of incidence; 1 of a mirror."""
         if self.mirror:
             return mirror
+        return self._metal(si, active) if self.fitted is None else self.fitted
+
+    def _metal(self, si: Any, active: Any) -> Metal:
         if self.eta is not None:
             return Metal(ETA.at(self.eta, si, active), K.at(self.k, si, active))
         return Metal(*artist_friendly(self.reflectivity.eval(si, active), self.edge_tint.eval(si, active)))
@@ -108,10 +122,14 @@ class Conductor(Parameter):
         """Reflectance, a function of the cosine of incidence; None if there is no metal."""
         return None if value is None else value.reflectance(si, active)
 
+    def updated(self, value: Any) -> Any:
+        """With its fit."""
+        return None if value is None else value.updated()
+
     def children(self, value: Any) -> Mapping[str, Any]:
         """The textures of the chosen way."""
-        parts = {} if value is None else vars(value)
-        return {name + self.suffix: texture for name, texture in parts.items() if texture is not None}
+        parts = {} if value is None else value.textures()
+        return {name + self.suffix: texture for name, texture in parts.items()}
 
     def check(self, value: Any) -> None:
         """Check the textures of the chosen way."""

@@ -91,6 +91,10 @@ class Parameter:
         """The parsed value at a surface point."""
         return value
 
+    def updated(self, value: Any) -> Any:
+        """The parsed value, with what is made from it once for all points if it is `settled`."""
+        return value
+
     def counts(self, model: Declared) -> bool:
         """Whether this means anything to ``model``, with its choices and flags."""
         return not self.when or getattr(model, self.when[0]) in self.when[1:]
@@ -506,14 +510,20 @@ class Declared:
                 for name in sorted(given.intersection(parameter.names())):
                     raise parameter.unused(name)
                 setattr(model, parameter.name, None)
-        model.update()
+        model.refresh()
         return model
 
     def configure(self, given: set[str]) -> None:
         """Settle parameters that depend on each other."""
 
+    def refresh(self) -> None:
+        """Bring everything up to date, at first and whenever ``mi.traverse`` changed a parameter."""
+        for parameter in self.declarations():
+            setattr(self, parameter.name, parameter.updated(getattr(self, parameter.name)))
+        self.update()
+
     def update(self) -> None:
-        """Bring up to date what is made from the parameters, at first and whenever ``mi.traverse`` changed one."""
+        """Bring up to date what is made from the parameters; part of `refresh`."""
 
     def at(self, name: str, si: Any, active: Any) -> Any:
         """The parameter ``name`` at a surface point: what its kind's ``at`` returns."""
@@ -561,6 +571,13 @@ def _coloured(found: np.ndarray) -> bool:
 def varies(texture: Any) -> bool:
     """Whether a texture may differ between points. Not all that do say so (Mitsuba's ``mesh_attribute``)."""
     return texture.is_spatially_varying() or not texture.class_name().endswith("Spectrum")
+
+
+def settled(*textures: Any) -> bool:
+    """Whether what is made from textures now holds everywhere, at all wavelengths, and needs no derivatives."""
+    if mi.is_spectral or any(map(varies, textures)):
+        return False
+    return not any(dr.grad_enabled(value) for texture in textures for _, value in mi.traverse(texture).items())
 
 
 def constant(name: str, texture: Any, why: str = "") -> Any:

@@ -53,7 +53,7 @@ def _plugin(base: Any, model_class: Any) -> type:
 
         def parameters_changed(self, keys: list[str]) -> None:
             self.model.check()
-            self.model.update()
+            self.model.refresh()
 
         def to_string(self) -> str:
             children = (f"  {name} = {child}".replace("\n", "\n  ") for name, child in self.model.children().items())

@@ -3,11 +3,12 @@
 import asperity  # noqa: F401  isort: skip
 import drjit as dr
 import drjit.llvm.ad as llvm
+import mitsuba as mi
 import numpy as np
 import pytest
 
-from asperity.conductors import ETA, K
-from asperity.microfacet.fresnel import conductor
+from asperity.conductors import ETA, Conductor, K, materials
+from asperity.microfacet.fresnel import ALLOWED, FittedMetal, Metal, conductor, fitted
 
 
 def cases(n=100_000):
@@ -49,3 +50,38 @@ def test_derivatives_are_finite_and_alive_without_absorption():
     dr.backward(conductor(llvm.Float64(0.3), llvm.Float64(0.5), k))
     slope = (exact(0.3, 0.5, 1e-6) - exact(0.3, 0.5, 0)) / 1e-6
     assert dr.grad(k)[0] == pytest.approx(slope, rel=1e-3) and slope < -0.1
+
+
+GLASSY = {"AlSb", "MgO", "SnTe", "ThF4"}
+"""Without absorption at some colour, and of a small index there, or with a critical angle."""
+
+
+def test_metals_are_fitted(rgb):
+    """All that Mitsuba has, at all cosines; float32 rounds by another 1e-5 where roots cancel."""
+    cos, exact_ones = mi.Float(np.linspace(0, 1, 100_001)), set()
+    for name in set(materials()) - {"none"}:
+        metal = Conductor("").at(Conductor("", name).parse(mi.Properties("vgroove")).updated(), None, True)
+        if not isinstance(metal, FittedMetal):
+            exact_ones.add(name.removesuffix("_palik"))
+            continue
+        exact = np.array(Metal(metal.eta, metal.k)(cos), dtype=float)
+        found = np.array(metal(cos), dtype=float)
+        assert np.abs(found / exact - 1).max() < ALLOWED + 1e-5 and found.min() > 0 and found.max() < 1 + 2**-22, name
+    assert exact_ones == GLASSY
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb", "llvm_ad_mono"])
+def test_a_fit_is_a_metal_in_every_variant(variant):
+    mi.set_variant(variant)
+    spectrum = type(mi.unpolarized_spectrum(mi.Spectrum(0)))
+    metal = Metal(spectrum(0.2), spectrum(3.5))
+    fit = fitted(metal)
+    assert isinstance(fit, FittedMetal)
+    np.testing.assert_allclose(fit(mi.Float(0.4)), metal(mi.Float(0.4)), rtol=1e-5)
+    np.testing.assert_allclose(fit.mixed(metal, 0.3)(mi.Float(0.4)), metal(mi.Float(0.4)), rtol=1e-5)
+
+
+def test_glass_is_not_fitted():
+    """Total reflection begins with a kink."""
+    glass = Metal(llvm.Array3f(0.5), llvm.Array3f(0))
+    assert fitted(glass) is glass

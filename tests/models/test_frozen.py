@@ -11,6 +11,7 @@ from asperity.models import MODELS
 BASE = {"type": "diffuse"}
 CASES = {  # description, and a parameter to move
     "metal": ({"type": "micrograin", "material": "Au", "base": BASE}, "tau_0.value"),
+    "fitted": ({"type": "micrograin", "eta": 0.5, "k": 3.0}, "eta.value"),
     "diffuse": ({"type": "micrograin", "specular": False, "base": BASE}, "tau_0.value"),
     "coated": ({"type": "micrograin", "int_ior": 1.5}, "tau_0.value"),
     "multiple": ({"type": "micrograin", "scattering": "multiple", "base": BASE}, "tau_0.value"),

@@ -16,7 +16,7 @@ from ...lobes import Lobe, LobeModel, glossy
 from ...microfacet.distributions import DISTRIBUTIONS, Distribution
 from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
-from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, varies
+from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Reflectance, fit
 from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric_bounces
@@ -139,9 +139,7 @@ class VGroove(LobeModel):
 
     def _constant_logarithm(self) -> list | None:
         """ln F's fit if it is the same everywhere, for good: else it takes 7 Fresnel terms a call."""
-        parts = [part for part in vars(self.metal).values() if part is not None]
-        differentiated = any(dr.grad_enabled(value) for part in parts for _, value in mi.traverse(part).items())
-        if not parts or mi.is_spectral or differentiated or any(map(varies, parts)):
+        if self.metal.mirror or not settled(*self.metal.textures().values()):
             return None
         logarithm = fit(self.at("metal", dr.zeros(mi.SurfaceInteraction3f), True))
         dr.make_opaque(logarithm)
