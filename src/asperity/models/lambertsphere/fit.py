@@ -3,11 +3,11 @@
 Prints them, ready to paste, with their errors and with those of the digits in transport.py. Needs half a minute;
 nothing imports this module when rendering.
 
-The digits in transport.py are not those printed: they are of an earlier fit of the same forms, whose script is lost.
-Those printed have the smallest largest error that the forms allow: .5 to 35 % smaller for H, up to a factor of three
-for the constants. (LOGARITHM and ONCE are those printed.) They are no better in the BRDF, where scattering of higher order is a difference that is small for
-small c: at c = .99 it errs by .05 % rms instead of .07 %, but at c = .2 by .10 % instead of .05 %, and at the horizon
-there by 5 % instead of 2 %. So the old digits stay.
+The digits in transport.py, but for LOGARITHM and ONCE, are not those printed: they are of an earlier fit of the same
+forms, whose script is lost. Those printed have the smallest largest error that the forms allow: .5 to 35 % smaller for
+H, up to a factor of three for the constants. They are no better in the BRDF, where scattering of higher order is a
+difference that is small for small c: at c = .99 it errs by .05 % rms instead of .07 %, but at c = .2 by .10 % instead
+of .05 %, and at the horizon there by 5 % instead of 2 %. So the old digits stay.
 
 Paper (d'Eon 2021)            Here
 c, s = sqrt(1 - c)            ``c``, `S`: everything is smooth in s, and is solved at these
