@@ -46,11 +46,11 @@ def test_ndf_is_normalised(tau_0, beta_x, beta_y):
     assert (w / 2 * projected).sum() * np.pi == pytest.approx(tau_0, rel=2e-3)
 
 
-@pytest.mark.parametrize("r", [1e-4, 0.03, 0.3, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("r", [1e-4, 0.03, 0.3, 1.0, 2.0, 4.4])
 def test_the_visible_height_is_inverted(r):
-    """The CDF at the sampled height returns the random number to 1e-4, for all cosines and its extremes."""
+    """The CDF at the sampled height returns the random number, for all cosines and its extremes: 4e-5 as measured."""
     rng = np.random.default_rng(5)
-    cos, azimuth = np.exp(rng.uniform(np.log(0.003), 0, N)), rng.uniform(0, 2 * np.pi, N)
+    cos, azimuth = np.exp(rng.uniform(np.log(0.001), 0, N)), rng.uniform(0, 2 * np.pi, N)
     u = np.float32(
         np.clip(
             np.r_[rng.uniform(0, 1, N - 2000), 10.0 ** rng.uniform(-7, -2, 1000), np.linspace(0.999, 1, 1000)],
@@ -63,18 +63,18 @@ def test_the_visible_height_is_inverted(r):
     h = llvm.Float64(sample_visible_normal(llvm.Float(r), w, llvm.Float(u), llvm.Float(rng.uniform(0, 1, N))).z)
     w = llvm.Array3f64(w)
     cdf = (1 - exposure(llvm.Float64(r), h, shadow(w, h))) / visible_fraction(llvm.Float64(r), w)
-    assert np.abs(np.asarray(cdf) - u).max() < 1e-4
+    assert np.abs(np.asarray(cdf) - u).max() < 4e-5
 
 
-@pytest.mark.parametrize("cos", [0.01, 0.3, 0.9])
+@pytest.mark.parametrize("cos", [0.001, 0.004, 0.01, 0.3, 0.9])
 def test_the_visible_azimuth_is_inverted(cos):
-    """The CDF at the azimuth returns the random number: two Halley steps leave 5e-5 at worst, one leaves 4e-3."""
+    """The CDF at the azimuth returns the random number: two Halley steps leave 4e-5 at worst, one leaves 4e-3."""
     rng, sin = np.random.default_rng(6), float(np.sqrt(1 - cos * cos))
     w, v = llvm.Array3f(0.6 * sin, 0.8 * sin, cos), np.float32(rng.uniform(0, 1, N))
     m = np.array(sample_visible_normal(llvm.Float(0.4), w, llvm.Float(rng.uniform(0, 1, N)), llvm.Float(v)), float)
     x = np.arctan2(0.6 * m[1] - 0.8 * m[0], 0.6 * m[0] + 0.8 * m[1])
-    a, b = cos * m[2], sin * np.sqrt(1 - m[2] ** 2)
+    a, b = cos * m[2], sin * np.hypot(m[0], m[1])  # of h, float32 has lost the digits
     limit = np.arccos(np.clip(-a / b, -1, 1))
     total = a * limit + b * np.sin(limit)
     cdf = (1 + (a * x + b * np.sin(x)) / total) / 2
-    assert np.abs(cdf - v).max() < 1e-4
+    assert np.abs(cdf - v).max() < 4e-5

@@ -60,6 +60,15 @@ def density(tau_0: Any) -> Any:
 
 FEWEST = 1e-15
 """Filling factor that stands for 0: its reciprocal's square is still a float32."""
+START = (
+    (0.3538207, -3.039518, 6.668182, -4.375297),
+    (4.001753, 17.71606, -75.05818, 61.26879),
+    (-10.7812, -38.88744, 221.591, -197.8905),
+    (14.1767, 37.90167, -258.1943, 240.5411),
+    (-6.218939, -13.70831, 105.1445, -99.72404),
+)
+"""alpha of `_visible_height` by powers of q^(1/4) (from the first on, rows) and cos^(1/2) (columns). What counts is the
+share of the visible area that one Halley step from there is off: 3e-5 at most, for all r and cosines from .001 to 1."""
 
 
 @dataclass
@@ -101,69 +110,59 @@ def sample_visible_normal(r: Any, w: Any, u: Any, v: Any) -> Any:
     [0, 1).
     """
     sin, cos = inclination(w)
-    h, sin_alpha, cos_alpha = _visible_height(r, sin, cos, u)
-    radius = dr.safe_sqrt((1 - h) * (1 + h))
-    limit = dr.pi - _gamma(cos, sin_alpha, cos_alpha)[0]
-    sin_azimuth, cos_azimuth = _visible_azimuth(cos * h, sin * radius, limit, sin * sin_alpha, v)
+    h, radius, sin_alpha, gamma = _visible_height(r, sin, cos, u)
+    sin_azimuth, cos_azimuth = _visible_azimuth(cos * h, sin * radius, sin * sin_alpha, dr.pi - gamma, v)
     x, y = heading(w.x, w.y)
     return type(w)(radius * (x * cos_azimuth - y * sin_azimuth), radius * (y * cos_azimuth + x * sin_azimuth), h)
 
 
-START = (
-    (0.3538207, -3.039518, 6.668182, -4.375297),
-    (4.001753, 17.71606, -75.05818, 61.26879),
-    (-10.7812, -38.88744, 221.591, -197.8905),
-    (14.1767, 37.90167, -258.1943, 240.5411),
-    (-6.218939, -13.70831, 105.1445, -99.72404),
-)
-"""TODO"""
-
-
-def _visible_height(r: Any, sin: Any, cos: Any, u: Any) -> tuple[Any, Any, Any]:
-    """(h, sin alpha, cos alpha): the height above which lies the share ``u`` of the visible area, and its silhouette.
+def _visible_height(r: Any, sin: Any, cos: Any, u: Any) -> tuple[Any, Any, Any, Any]:
+    """(h, R, sin alpha, gamma): the height above which lies the share ``u`` of the visible area, and the ring there.
 
     1 - exp(-r sigma(h)) = u tau_i, where sigma(h) = pi (1 - h^2) + sigma_s(h) is the area that a grain's part above h
     covers or shades on the plane.
     """
-    # sigma(0) is pi (1 + 1 / cos) / 2; sigma(sin), above which there is no shadow, pi cos^2; their difference is
-    # pi / 2 (1 - cos) (1 + 2 cos + 2 cos^2) / cos.
+    # Above h = sin there is no shadow. sigma(sin) = pi cos^2, and sigma(0) = pi / 2 (1 + 1 / cos) is more by
+    # pi / (2 cos) times this:
     difference = greater((1 - cos) * polynomial(cos, (1, 2, 2)), 1e-12)
-    inverse_cos, inverse_r, inverse_difference = reciprocals(cos, r, difference)
-    sigma = -log1p(-u * one_minus_exp(r * (dr.pi / 2) * (1 + inverse_cos))) * inverse_r
-    # Above h = sin the inverse is a root; below, the unknown is alpha: h = sin cos(alpha).
-    q = (sigma - dr.pi * cos * cos) * (2 / dr.pi) * cos * inverse_difference
-    root = dr.sqrt(dr.sqrt(lesser(greater(q, 0), 1)))
-    start = root * polynomial(root, [polynomial(dr.sqrt(cos), row) for row in START])
+    per_cos, per_r, per_difference = reciprocals(cos, r, difference)
+    sigma = -log1p(-u * one_minus_exp(r * (dr.pi / 2) * (1 + per_cos))) * per_r
+    q = lesser((sigma - dr.pi * cos * cos) * (2 / dr.pi) * cos * per_difference, 1)
+    # Without shadow, the inverse is a root; else the unknown is alpha: h = sin cos(alpha).
+    shaded, unshaded_square = q > 0, sigma * dr.inv_pi  # R^2 = 1 - h^2
+    root = dr.sqrt(dr.select(shaded, q, greater(1 - unshaded_square, 0)))
+    fourth = dr.sqrt(root)
+    start = fourth * polynomial(fourth, [polynomial(dr.sqrt(cos), row) for row in START])
 
     def area(alpha: Any, sin_alpha: Any, cos_alpha: Any) -> tuple[Any, Any, Any]:  # and its derivatives by alpha
-        h = sin * cos_alpha
-        gamma, slope = _gamma(cos, sin_alpha, cos_alpha)
-        lit = dr.pi - gamma
-        value = lit * (1 - h * h) + (alpha - h * sin * sin_alpha) * inverse_cos
+        h, x = sin * cos_alpha, cos * cos_alpha
+        gamma, per_radius = _gamma(x, sin_alpha, dr.square(x) + dr.square(sin_alpha))
+        lit, slope = dr.pi - gamma, cos * dr.square(per_radius)  # that of gamma
+        value = lit * (1 - h * h) + (alpha - h * sin * sin_alpha) * per_cos
         # d sigma/dh = -width / cos, where width is the ring at height h as seen along w: int (w.m')+ over the azimuth.
         width = 2 * (cos * h * lit + sin * sin_alpha)
         width_slope = 2 * (sin * cos_alpha - cos * sin * sin_alpha * lit - cos * h * slope)
-        scale = sin * inverse_cos
-        return value, scale * width * sin_alpha, scale * (width_slope * sin_alpha + width * cos_alpha)
+        tan = sin * per_cos
+        return value, tan * width * sin_alpha, tan * (width_slope * sin_alpha + width * cos_alpha)
 
-    sin_alpha, cos_alpha = _invert(area, sigma, start, dr.pi / 2, 1)
-    shaded = q > 0
-    h = dr.select(shaded, sin * greater(cos_alpha, 0), dr.safe_sqrt(1 - sigma / dr.pi))
-    return h, dr.select(shaded, sin_alpha, 0), dr.select(shaded, cos_alpha, 1)
-
-
-def _gamma(cos: Any, sin_alpha: Any, cos_alpha: Any) -> tuple[Any, Any]:
-    """gamma and d gamma/d alpha, see `silhouette`."""
-    x = cos * cos_alpha
-    scale = dr.rsqrt(dr.square(x) + dr.square(sin_alpha) + TINY)
-    (gamma,) = angles((x * scale, sin_alpha * scale))
-    return gamma, cos * dr.square(scale)
+    sin_alpha, cos_alpha = _invert(area, sigma, start, dr.pi / 2, steps=1)
+    sin_alpha, cos_alpha = dr.select(shaded, sin_alpha, 0), greater(cos_alpha, 0)
+    square = dr.select(shaded, dr.square(cos * cos_alpha) + dr.square(sin_alpha), unshaded_square)
+    gamma, per_radius = _gamma(cos * cos_alpha, sin_alpha, square)
+    return dr.select(shaded, sin * cos_alpha, root), square * per_radius, sin_alpha, gamma
 
 
-def _visible_azimuth(a: Any, b: Any, limit: Any, b_sin_limit: Any, v: Any) -> tuple[Any, Any]:
+def _gamma(x: Any, sin_alpha: Any, square: Any) -> tuple[Any, Any]:
+    """(gamma, 1 / R): R cos(gamma) = cos cos(alpha) = ``x``, R sin(gamma) = sin(alpha), R^2 = ``square``."""
+    per_radius = dr.rsqrt(square + TINY)
+    (gamma,) = angles((x * per_radius, sin_alpha * per_radius))
+    return gamma, per_radius
+
+
+def _visible_azimuth(a: Any, b: Any, b_sin_limit: Any, limit: Any, v: Any) -> tuple[Any, Any]:
     """Sine and cosine of an azimuth x about ``w`` with density proportional to (w.m')+ = (a + b cos x)+.
 
-    ``limit`` = phi_q is where that is zero. ``v`` chooses the side, and what is left of it the point.
+    It vanishes at the ``limit``, phi_q. ``v`` chooses the side, and what is left of it the point.
     """
     side, v = dr.select(v < 0.5, -1.0, 1.0), dr.abs(2 * v - 1)
 
@@ -172,7 +171,7 @@ def _visible_azimuth(a: Any, b: Any, limit: Any, b_sin_limit: Any, v: Any) -> tu
 
     # Where a < b the density vanishes linearly at the limit, so the distribution ends in a square root.
     start = limit * (1 - dr.sqrt(1 - v))
-    sin_x, cos_x = _invert(distribution, v * (a * limit + b_sin_limit), start, limit, 2)
+    sin_x, cos_x = _invert(distribution, v * (a * limit + b_sin_limit), start, limit, steps=2)
     return side * sin_x, cos_x
 
 
