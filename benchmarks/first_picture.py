@@ -23,7 +23,7 @@ SLOWER = 1.2
 
 def first_picture(name: str) -> dict[str, float]:
     """Seconds until there is one, in this process."""
-    import asperity  # noqa: F401  (before Mitsuba)
+    import asperity  # noqa: F401  isort: skip  (before Mitsuba)
     import drjit as dr
     import mitsuba as mi
 

@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import json
 import re
 from collections import defaultdict
 from pathlib import Path
@@ -27,6 +28,22 @@ def models():
 def test_parameter_tables_are_those_of_the_code(name):
     page = (ROOT / "docs" / f"{name}.md").read_text()
     assert build.with_table(page, models()[name]) == page, "run `python docs/build.py`"
+
+
+SPEED = json.loads(build.SPEED.read_text())
+TIMED = sorted({row.split(",")[0] for row in SPEED["rows"]} & models().keys())
+
+
+@pytest.mark.parametrize("name", TIMED)
+def test_speed_tables_are_those_of_the_benchmark(name):
+    page = (ROOT / "docs" / f"{name}.md").read_text()
+    assert build.BEGIN_SPEED in page
+    assert build.with_speed(page, name, SPEED) == page, "run `python docs/build.py`"
+
+
+def test_every_model_with_a_table_of_speed_was_timed():
+    pages = {path.stem for path in (ROOT / "docs").glob("*.md") if build.BEGIN_SPEED in path.read_text()}
+    assert pages == set(TIMED)
 
 
 def test_readme_begins_with_a_picture_and_two_commands():
