@@ -84,8 +84,9 @@ DIFFRACTING = {
     "twoscale, conserving": {**TWO_SCALES, "energy": "conserving"},
     "twoscale, anisotropic": {"type": "twoscale", "material": "Au", "p": 0.7, "alpha_u": 0.14, "alpha_v": 0.07},
 }
+FULL = {"size": 256, "spp": 32, "rounds": 11, "lanes": 1 << 21}
+QUICK = {"size": 96, "spp": 8, "rounds": 3, "lanes": 1 << 19}
 GROUPS = (MATERIALS, MATTE, PLASTIC, DIFFRACTING)
-LANES = 1 << 21
 
 
 def bare(material, size: int, spp: int) -> dict:
@@ -150,13 +151,13 @@ def frame(description: dict):
     return lambda: finish(mi.render(scene, seed=next(seed)))
 
 
-def calls(materials: dict) -> dict[str, dict]:
-    """For ``eval_pdf`` and ``sample``, what calls it at `LANES` random directions, for each material."""
-    rng, ctx = mi.PCG32(size=LANES), mi.BSDFContext()
+def calls(materials: dict, lanes: int) -> dict[str, dict]:
+    """For ``eval_pdf`` and ``sample``, what calls it at so many random directions, for each material."""
+    rng, ctx = mi.PCG32(size=lanes), mi.BSDFContext()
     wi, wo = (mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32())) for _ in range(2))
     u, v = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
     dr.eval(wi, wo, u, v)
-    si = dr.zeros(mi.SurfaceInteraction3f, LANES)
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes)
     si.wi = wi
     bsdfs = {name: mi.load_dict(material) for name, material in materials.items()}
     return {
@@ -169,16 +170,16 @@ def quartiles(values: np.ndarray) -> list[float]:
     return [float(f"{x:.4g}") for x in np.percentile(values, (25, 50, 75))]
 
 
-def compared(materials: dict, size: int, spp: int, rounds: int) -> dict[str, dict]:
+def compared(materials: dict, size: int, spp: int, rounds: int, lanes: int) -> dict[str, dict]:
     """By material and column, the quartiles of its time (in seconds; of calls in ns for each lane) and of its ratio."""
     reference = next(iter(materials))
-    columns = calls(materials)
+    columns = calls(materials, lanes)
     for scene, make in scenes(size, spp).items():
         columns[scene] = {name: frame(make(material)) for name, material in materials.items()}
     rows: dict[str, dict] = {name: {"against": reference} for name in materials}
     for column, tasks in columns.items():
-        print(f"{reference}: {column}", file=sys.stderr)
-        unit = 1e9 / LANES if column in ("eval_pdf", "sample") else 1
+        print(f"{time.process_time():6.0f} s of CPU; now {column} against {reference}", file=sys.stderr)
+        unit = 1e9 / lanes if column in ("eval_pdf", "sample") else 1
         found = turns(tasks, rounds)
         for name, seconds in found.items():
             ratio = quartiles(seconds / found[reference])
@@ -248,7 +249,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="part of the materials' names")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers")
     parser.add_argument("--memory", action="store_true", help="instead, what updates leave in memory")
-    asked = parser.parse_args()
+    asked, start = parser.parse_args(), time.perf_counter()
     mi.set_variant("llvm_ad_rgb")
     mi.set_log_level(mi.LogLevel.Error)
     register()
@@ -256,19 +257,20 @@ def main() -> None:
         early, late = updates(200 if asked.quick else 500)
         print(f"{early} MB after 100 updates with a render after each, {late} MB after the last")
         return
-    size, spp, rounds = (96, 8, 5) if asked.quick else (256, 32, 11)
-    report = circumstances() | {"size": size, "spp": spp, "rounds": rounds, "lanes": LANES, "rows": {}}
+    effort = QUICK if asked.quick else FULL
+    report = circumstances() | effort | {"rows": {}}
     for group in GROUPS:
         reference, *others = group
         chosen = [name for name in others if asked.only in name]
         if not chosen:
             continue
-        rows = compared({name: group[name] for name in (reference, *chosen)}, size, spp, rounds)
+        rows = compared({name: group[name] for name in (reference, *chosen)}, **effort)
         Console(width=150).print(table(rows))
         report["rows"] |= rows
         if asked.json:  # after each group: a long run may end early
             with atomically(asked.json) as part:
                 part.write_text(json.dumps(report, indent=1) + "\n")
+    print(f"{time.perf_counter() - start:.0f} s in all")
 
 
 if __name__ == "__main__":

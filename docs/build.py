@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from textwrap import fill
 
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- parameters: made by docs/build.py -->", "<!-- end of parameters -->"
@@ -50,14 +51,13 @@ def speed_table(name: str, report: dict) -> str:
         cells = [f"{found[call]['time'][1]:.2g}" for call in CALLS]
         cells += ["1" if row == reference else spread(found[scene]["ratio"]) for scene in FRAMES]
         lines.append(f"| {row if row == reference else row.removeprefix(f'{name}, ')} | " + " | ".join(cells) + " |")
-    return (
-        "\n".join(lines)
-        + f"""
-
-`python benchmarks/speed.py`, one process, {report["threads"]} threads of {report["machine"]}: medians of {report["rounds"]} rounds in which
-all take turns, ± half the distance of the quartiles. Frames of {report["size"]}² pixels over those of {reference}; calls by the lane, of
-{report["lanes"]} random directions. Mitsuba {report["mitsuba"]}, Dr.Jit {report["drjit"]}, LLVM {report["llvm"]}; commit {report["commit"]}."""
+    note = (
+        "`python benchmarks/speed.py`, one process, {threads} threads of {machine}: medians of {rounds} rounds in "
+        "which all take turns, ± half the distance of the quartiles. Frames of {size} x {size} pixels over those of "
+        "the first row; calls by the lane, of {lanes} random directions. Mitsuba {mitsuba}, Dr.Jit {drjit}, LLVM "
+        "{llvm}; commit {commit}."
     )
+    return "\n".join([*lines, "", fill(note.format(**report), 120)])
 
 
 def spread(quartiles: list[float]) -> str:
