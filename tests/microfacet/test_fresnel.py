@@ -81,6 +81,14 @@ def test_a_fit_is_a_metal_in_every_variant(variant):
     np.testing.assert_allclose(fit.mixed(metal, 0.3)(mi.Float(0.4)), metal(mi.Float(0.4)), rtol=1e-5)
 
 
+@pytest.mark.parametrize("index", [(40_000, 1e-3), (20_000, 20_000), (5, 5), (1e-3, 100)], ids=str)
+def test_fits_of_large_indices_do_not_overflow(index):
+    """As `artist_friendly` makes them of white; F is that near 1 that float32 rounds it by as much as its error."""
+    metal, cos = Metal(*map(llvm.Array3f, index)), llvm.Float(np.linspace(0, 1, 10_001))
+    assert isinstance(fitted(metal), FittedMetal)
+    np.testing.assert_allclose(fitted(metal)(cos), metal(cos), rtol=5e-6)
+
+
 def test_glass_is_not_fitted():
     """Total reflection begins with a kink."""
     glass = Metal(llvm.Array3f(0.5), llvm.Array3f(0))

@@ -20,7 +20,8 @@ import drjit as dr
 
 from . import ggx
 from .epd import Power
-from .numerics import TINY, heading, normalised, one_minus_exp
+from .fast import sincos
+from .numerics import TINY, heading, log1p, normalised, one_minus_exp
 from .quadrature import integrate
 from .sampling import direction
 
@@ -71,6 +72,8 @@ class Distribution:
 
     def along(self, cos_azimuth: Any, sin_azimuth: Any) -> tuple[Any, Any]:
         """(alpha_phi, scale) at this azimuth."""
+        if self.alpha_u is self.alpha_v:
+            return self.alpha_u, 1
         square = dr.rcp(dr.square(cos_azimuth / self.alpha_u) + dr.square(sin_azimuth / self.alpha_v))
         return dr.sqrt(square), square / (self.alpha_u * self.alpha_v)
 
@@ -79,6 +82,8 @@ class Distribution:
 
         That of normals has the density scale / (2 pi) over phi; over psi it is even.
         """
+        if self.alpha_u is self.alpha_v:
+            return cos_psi, sin_psi, self.alpha_u
         x, y = self.alpha_u * cos_psi, self.alpha_v * sin_psi
         square = dr.square(x) + dr.square(y)
         inverse = dr.rsqrt(square)
@@ -86,8 +91,8 @@ class Distribution:
 
     def sample_azimuth(self, v: Any) -> tuple[Any, Any]:
         """(cos phi, sin phi) of normals with density D cos."""
-        sin, cos = dr.sincos(2 * dr.pi * v)
-        return self.stretched_azimuth(cos, sin)[:2]
+        sin, cos = sincos(2 * dr.pi * v - dr.pi)
+        return self.stretched_azimuth(-cos, -sin)[:2]
 
     def density(self, m: Any) -> Any:
         """D(m) of a unit normal above the horizon."""
@@ -180,8 +185,9 @@ class Phong(Distribution):
     @staticmethod
     def tilt_density(alpha: Any, sin: Any, cos: Any) -> Any:
         """D_iso at the tilt with this sine and cosine."""
-        # Half the logarithm of a small sin^2 is exact where that of a cosine near 1 has lost its digits.
-        log_cos = dr.select(sin < 0.5, dr.log(dr.maximum(1 - sin * sin, TINY)) / 2, dr.log(dr.maximum(cos, TINY)))
+        # Half of ln(1 - sin^2) where the logarithm of a cosine near 1 has lost its digits.
+        near, far = dr.minimum(sin, 0.5), dr.maximum(cos, TINY)
+        log_cos = dr.select(sin < 0.5, log1p(-near * near) / 2, dr.log(far))
         return dr.exp(Phong.exponent(alpha) * log_cos) / (dr.pi * dr.square(alpha))
 
     @staticmethod

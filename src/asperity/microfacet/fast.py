@@ -69,6 +69,13 @@ def sincos(x: Any) -> tuple[Any, Any]:
     return sin, 1 - versine
 
 
+def acute_sincos(x: Any) -> tuple[Any, Any]:
+    """(sin x, cos x) for x in [0, 1.1], to 1e-7: Taylor's series."""
+    z = x * x
+    sin = x * polynomial(z, (1, -1 / 6, 1 / 120, -1 / 5040, 1 / 362880))
+    return sin, polynomial(z, (1, -1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800))
+
+
 def angles(*points: tuple[Any, Any]) -> list:
     """Angle in [0, pi] of each unit vector (cos, sin), sin >= 0, to 3e-7 of itself; by one division."""
     halves = [sin * inverse for (_, sin), inverse in zip(points, reciprocals(*(1 + dr.abs(cos) for cos, _ in points)))]

@@ -62,14 +62,18 @@ class FittedMetal(Metal):
     which depend on a and a^2 + b^2 alone, two smooth functions of c: their mean is
 
         F = (p - q) r / ((p + q) (r + q s)),   p = a^2 + b^2 + c,   q = 2 a cos,   r = (a^2 + b^2) c + s^2.
+
+    Of p, q and r the ``unit`` is what a^2 + b^2 is at c = 0: large metals do not overflow.
     """
 
-    modulus: list  # a^2 + b^2 by powers of cos^2, spectra
+    unit: Any  # its inverse
+    modulus: list  # a^2 + b^2 by powers of c, spectra
     root: list  # a
 
     def __call__(self, cos: Any) -> Any:
         """Unpolarised reflectance at the cosine of incidence."""
-        above, below = zip(*(_fraction(cos, *both) for both in zip(zip(*self.modulus), zip(*self.root))))
+        channels = zip(self.unit, zip(*self.modulus), zip(*self.root))
+        above, below = zip(*(_fraction(cos, *channel) for channel in channels))
         return type(self.eta)([a * inverse for a, inverse in zip(above, reciprocals(*below))])
 
 
@@ -80,12 +84,13 @@ def fitted(metal: Metal) -> Metal:
     are good to 1e-6.
     """
     roots = [_root(metal.eta, metal.k, float(cos2)) for cos2 in NODES]
-    modulus = _fit([a * a + b * b for a, b in roots])
-    found = FittedMetal(metal.eta, metal.k, modulus, _fit([a for a, _ in roots]))
+    modulus, root = _fit([a * a + b * b for a, b in roots]), _fit([a for a, _ in roots])
+    unit = dr.rcp(modulus[0])
+    found = FittedMetal(metal.eta, metal.k, unit, *([unit * power for power in one] for one in (modulus, root)))
     dr.make_opaque(found)  # other values need no other kernel
     cos = dr.scalar.ArrayXf64(np.linspace(1e-3, 1, 100))
-    for eta, k, *polynomials in zip(*map(_channels, (metal.eta, metal.k, *modulus, *found.root))):
-        above, below = _fraction(cos, polynomials[: DEGREE + 1], polynomials[DEGREE + 1 :])
+    for eta, k, one, *powers in zip(*map(_channels, (found.eta, found.k, unit, *found.modulus, *found.root))):
+        above, below = _fraction(cos, one, powers[: DEGREE + 1], powers[DEGREE + 1 :])
         exact = conductor(cos, eta, k)
         if not dr.all((dr.abs(above / below - exact) < ALLOWED * exact) & (above < below)):
             return metal
@@ -100,11 +105,11 @@ def _channels(spectrum: Any) -> list[float]:
     return np.array(spectrum, dtype=float).ravel().tolist()
 
 
-def _fraction(cos: Any, modulus: Any, root: Any) -> tuple[Any, Any]:
+def _fraction(cos: Any, unit: Any, modulus: Any, root: Any) -> tuple[Any, Any]:
     """Numerator and denominator of `FittedMetal`'s F at one wavelength."""
     cos2 = cos * cos
     sin2, square = 1 - cos2, polynomial(cos2, modulus)
-    p, q, r = square + cos2, 2 * cos * polynomial(cos2, root), square * cos2 + sin2 * sin2
+    p, q, r = square + unit * cos2, 2 * cos * polynomial(cos2, root), square * cos2 + unit * (sin2 * sin2)
     return (p - q) * r, (p + q) * (r + q * sin2)
 
 

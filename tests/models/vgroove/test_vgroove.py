@@ -15,6 +15,7 @@ from helpers import N, cosine_directions, towards
 from asperity.lab import evaluate as lab
 from asperity.microfacet.distributions import DISTRIBUTIONS, GGX
 from asperity.models.vgroove.bounces import needed_bounces_nonsymmetric
+from asperity.models.vgroove.fresnel import Path
 from asperity.models.vgroove.kaleidoscope import Pair
 from asperity.models.vgroove.model import VGroove
 from asperity.models.vgroove.symmetric import symmetric
@@ -104,10 +105,10 @@ def test_constant_reflectance_multiplies_by_bounces(rgb, monkeypatch, symmetric)
     rho, most = 0.5, 8
     monkeypatch.setattr("asperity.microfacet.fresnel.conductor", lambda cos, eta, k: 0 * eta + rho)
     # A constant is no polynomial without a constant term, as reflectances are, which are 1 at grazing angles.
-    for module in ("symmetric", "nonsymmetric"):
-        monkeypatch.setattr(
-            f"asperity.models.vgroove.{module}.product", lambda e, fan: mi.Color3f(rho ** mi.Float(fan.k))
-        )
+    grooves = "asperity.models.vgroove"
+    monkeypatch.setattr(f"{grooves}.nonsymmetric.product", lambda e, fan: mi.Color3f(rho ** mi.Float(fan.k)))
+    monkeypatch.setattr(f"{grooves}.symmetric.through", lambda *_: mi.Color3f(rho**4))  # the middle one of 5 is apart
+    monkeypatch.setattr(Path, "of", lambda a, l, x, y, angle: Path(mi.Color3f(float(np.log(rho)) / 2 * angle), 0))
     given = {"alpha": 0.7, "symmetric": symmetric}
     mean, _, largest = albedo(20, material="Au", max_bounces=most, **given)
     model = mi.load_dict({"type": "vgroove", **given, "max_bounces": most}).model

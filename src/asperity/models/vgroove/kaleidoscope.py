@@ -24,7 +24,8 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from ...microfacet.numerics import heading
+from ...microfacet.fast import angles, greater, lesser, sincos
+from ...microfacet.numerics import clamp, heading
 
 
 class Groove(NamedTuple):
@@ -88,14 +89,6 @@ def bounces(groove: Groove, psi: Any, offset: Any, most: Any) -> Any:
     return k
 
 
-def symmetric_bounces(groove: Groove, psi: Any, offset: Any, most: Any) -> Any:
-    """The same for facets of equal tilt, in closed form (Eq. 4): a circle goes through the rims of all images."""
-    UInt, half_aperture = dr.uint32_array_t(type(psi)), groove.aperture / 2
-    x = dr.pi - psi - half_aperture - dr.asin(dr.clip(offset * dr.sin(groove.tilt_l), -1, 1))
-    k = dr.ceil(x / dr.maximum(2 * half_aperture, 1e-6))
-    return UInt(dr.clip(k, 1, type(psi)(most) + 1))
-
-
 def entrance(groove: Groove, psi: Any, u: Any) -> tuple[Any, Any]:
     """(offset, swap): a ray's offset from the apex, uniform over the opening, and whether the ray meets R first.
 
@@ -105,6 +98,26 @@ def entrance(groove: Groove, psi: Any, u: Any) -> tuple[Any, Any]:
     right = dr.cos(psi + groove.tilt_r) / dr.maximum(dr.sin(groove.tilt_r), 1e-6)
     offset = dr.lerp(left, -right, u)
     return dr.abs(offset), offset < 0
+
+
+def symmetric_way(psi: tuple, tilt: tuple, u: Any, most: Any) -> tuple[Any, Any, tuple]:
+    """(swap, k, exit): `entrance`, `bounces` and `exit_angle` of facets of equal tilt, by closed forms (Eq. 4).
+
+    Angles are sines and cosines. Since a circle goes through the rims of all images, a ray at ``offset`` from the apex
+    meets it at an angle whose sine is that, if the rims' distance is 1; so k is what it turns by, over the aperture.
+    """
+    (sin_psi, cos_psi), (sin, cos) = psi, tilt
+    offset = dr.lerp(cos_psi * cos + sin_psi * sin, sin_psi * sin - cos_psi * cos, u)
+    swap, offset = offset < 0, lesser(dr.abs(offset), 1)
+    sin_psi = dr.select(swap, -sin_psi, sin_psi)
+    across = dr.sqrt((1 - offset) * (1 + offset))
+    size, half_aperture, turn = angles((cos_psi, dr.abs(sin_psi)), (sin, cos), (across, offset))
+    through = dr.pi - dr.select(sin_psi < 0, -size, size)
+    k = dr.ceil((through - half_aperture - turn) / greater(2 * half_aperture, 1e-6))
+    k = greater(lesser(k, type(u)(most) + 1), 1)
+    sin_out, cos_out = sincos(clamp(through - 2 * k * half_aperture, -dr.pi / 2, dr.pi / 2))
+    odd = k - 2 * dr.floor(k / 2) > 0.5
+    return swap, dr.uint32_array_t(type(u))(k), (dr.select(odd, sin_out, -sin_out), cos_out)
 
 
 @dataclass
@@ -131,10 +144,15 @@ class Pair:
         # In the mirror direction the plane is any, and the plane of incidence as good as others.
         x, y = heading(h.x, h.y, heading(i.x - o.x, i.y - o.y))
         flat = h.x * x + h.y * y
-        norm = dr.sqrt(dr.square(flat) + dr.square(h.z))  # 2 l cos delta
-        sin, cos = flat / norm, h.z / norm
+        sin, cos, norm = polar(flat, h.z)  # 2 l cos delta
         across = ((i.x - o.x) * x + (i.y - o.y) * y) * cos - (i.z - o.z) * sin
-        across = dr.abs(across)  # 2 l sin delta
-        double = dr.sqrt(dr.square(across) + dr.square(norm))
-        delta = dr.atan2(across, norm)
-        return cls(x, y, dr.atan2(flat, h.z), sin, cos, delta, across / double, norm / double, double / 2)
+        sin_delta, cos_delta, double = polar(dr.abs(across), norm)  # 2 l
+        theta, delta = angles((cos, sin), (cos_delta, sin_delta))
+        return cls(x, y, theta, sin, cos, delta, sin_delta, cos_delta, double / 2)
+
+
+def polar(y: Any, x: Any) -> tuple[Any, Any, Any]:
+    """(sine, cosine, length) of the vector (x, y)."""
+    square = dr.square(x) + dr.square(y)
+    inverse = dr.rsqrt(square)
+    return y * inverse, x * inverse, square * inverse

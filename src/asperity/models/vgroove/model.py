@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -18,11 +20,12 @@ from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
-from .fresnel import Reflectance, fit
-from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, symmetric_bounces
+from .fresnel import Reflectance, fit, fit_power
+from .kaleidoscope import Groove, Pair, bounces, entrance, exit_angle, polar, symmetric_way
 from .microgeometry import ExplicitGrooves
 from .nonsymmetric import nonsymmetric
-from .symmetric import symmetric
+from .symmetric import WRITTEN, symmetric
+from .terms import ROUGHEST, by_terms
 from .tilts import Tilts
 
 CITATION = """\
@@ -105,7 +108,9 @@ class VGroove(LobeModel):
             lost = f"alpha = {alpha:g}: more than 0.1 % of the light bounces over {MOST} times, and is lost."
             warnings.warn(lost, stacklevel=2)
         self.most = dr.opaque(mi.UInt32, most) if dr.is_jit_v(mi.Float) else most
-        self.logarithm = self._constant_logarithm()
+        self.few = min(most, WRITTEN + 1)
+        self.rough = alpha is None or alpha > ROUGHEST
+        self.logarithm, self.power = self._constant_fits()
 
     def flags(self) -> list[int]:
         """One glossy lobe."""
@@ -116,12 +121,18 @@ class VGroove(LobeModel):
         reflectance = None
         if not self.metal.mirror:
             once = self.at("metal", si, active)
-            reflectance = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm)
-        return [GrooveLobe(self.kind(*self._alphas(si, active)), self.symmetric, self.most, reflectance)]
+            reflectance = Reflectance(once, fit(once) if self.logarithm is None else self.logarithm, self.power)
+        brdf = nonsymmetric
+        if self.symmetric:
+            brdf = by_terms if self.rough else partial(symmetric, few=self.few)
+        return [GrooveLobe(self.kind(*self._alphas(si, active)), brdf, self.symmetric, self.most, reflectance)]
 
     def _alphas(self, si: Any, active: Any) -> tuple[Any, Any]:
         if self.alpha is None:
             alpha = dr.sqrt(2 / (self.at("exponent", si, active) + 2))
+            return alpha, alpha
+        if self.isotropic:
+            alpha = clamp(self.at("alpha", si, active)[0], SMOOTHEST, self.kind.largest)
             return alpha, alpha
         u, v = (clamp(alpha, SMOOTHEST, self.kind.largest) for alpha in self.at("alpha", si, active))
         return u, v
@@ -137,13 +148,14 @@ class VGroove(LobeModel):
             alphas = np.sqrt(2 / (np.maximum(alphas, 0) + 2))
         return float(np.clip(alphas.max(), SMOOTHEST, min(type(self).alpha.high, self.kind.largest)))
 
-    def _constant_logarithm(self) -> list | None:
-        """ln F's fit if it is the same everywhere, for good: else it takes 7 Fresnel terms a call."""
+    def _constant_fits(self) -> tuple[list | None, list | None]:
+        """Those of ln F and F if it is the same everywhere, for good: else the first takes 7 Fresnel terms a call."""
         if self.metal.mirror or not settled(*self.metal.textures().values()):
-            return None
-        logarithm = fit(self.at("metal", dr.zeros(mi.SurfaceInteraction3f), True))
+            return None, None
+        once = self.at("metal", dr.zeros(mi.SurfaceInteraction3f), True)
+        logarithm = fit(once)
         dr.make_opaque(logarithm)
-        return logarithm
+        return logarithm, fit_power(once)
 
 
 @dataclass
@@ -151,6 +163,7 @@ class GrooveLobe(Lobe):
     """The lobe of grooves: all ways through them, however many bounces that takes."""
 
     distribution: Distribution
+    brdf: Callable  # (pair, cos_i, tilts, most, reflectance) -> (f cos_o, the same of mirrors)
     symmetric: bool
     most: Any  # bounces that are followed
     reflectance: Reflectance | None  # None is a mirror
@@ -159,8 +172,7 @@ class GrooveLobe(Lobe):
         """(f cos_o, density), which is the same for mirrors."""
         pair = Pair.of(wi, wo)
         tilts = Tilts.along(self.distribution, pair.cos_azimuth, pair.sin_azimuth)
-        brdf = symmetric if self.symmetric else nonsymmetric
-        return brdf(pair, wi.z, tilts, self.most, self.reflectance)
+        return self.brdf(pair, wi.z, tilts, self.most, self.reflectance)
 
     def draw(self, wi: Any, u: Any, v: Any) -> Any:
         """Where a ray goes that meets a groove by chance; nowhere above, if it bounces too often, and is lost."""
@@ -174,16 +186,17 @@ class GrooveLobe(Lobe):
         """
         x, y = self.distribution.sample_azimuth(v.y)
         tilts = Tilts.along(self.distribution, x, y)
-        tilt = partner = dr.atan2(*tilts.sample(v.x))
-        if not self.symmetric:
-            partner = dr.atan2(*tilts.sample_partner(*more_numbers(u, v.x, v.y)))
-        groove = Groove(tilt, partner)
-        across = wi.x * x + wi.y * y
-        psi, length = dr.atan2(across, wi.z), dr.sqrt(dr.square(across) + dr.square(wi.z))
-        offset, swap = entrance(groove, psi, u)
-        groove, psi = groove.swapped(swap), dr.select(swap, -psi, psi)
+        tilt = tilts.sample(v.x)
+        sin_psi, cos_psi, length = polar(wi.x * x + wi.y * y, wi.z)
+        if self.symmetric:
+            swap, k, (sin, cos) = symmetric_way((sin_psi, cos_psi), tilt, u, self.most)
+        else:
+            groove = Groove(dr.atan2(*tilt), dr.atan2(*tilts.sample_partner(*more_numbers(u, v.x, v.y))))
+            psi = dr.atan2(sin_psi, cos_psi)
+            offset, swap = entrance(groove, psi, u)
+            groove, psi = groove.swapped(swap), dr.select(swap, -psi, psi)
+            k = bounces(groove, psi, offset, self.most)
+            sin, cos = dr.sincos(exit_angle(groove, psi, k))
         x, y = dr.select(swap, -x, x), dr.select(swap, -y, y)
-        k = (symmetric_bounces if self.symmetric else bounces)(groove, psi, offset, self.most)
-        sin, cos = dr.sincos(exit_angle(groove, psi, k))
         along = wi.y * x - wi.x * y  # across the plane of the kaleidoscope; turns round
         return direction(length * sin * x + along * y, length * sin * y - along * x, length * cos), k

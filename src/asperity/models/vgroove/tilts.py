@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import drjit as dr
 
 from ...microfacet.distributions import GGX, Beckmann, Distribution, Phong
+from ...microfacet.fast import reciprocals
 from ...microfacet.numerics import normalised, one_minus_exp
 
 
@@ -33,6 +34,14 @@ class Tilts:
     def density(self, sin: Any, cos: Any) -> Any:
         """D(m) at the tilt with this sine and cosine."""
         return self.scale * self.distribution.tilt_density(self.alpha, sin, cos)
+
+    def densities(self, tilts: list[tuple[Any, Any]]) -> list:
+        """D(m) at several tilts, each a sine and cosine."""
+        return [self.density(*tilt) for tilt in tilts]
+
+    def steepness(self) -> Any:
+        """dln D / dln b at the tilt pi/2 - b, of a groove of aperture 2 b, for b near .28."""
+        raise NotImplementedError
 
     def sample(self, u: Any) -> tuple[Any, Any]:
         """(sin a, cos a) with density D_iso cos a per steradian, for ``u`` in [0, 1)."""
@@ -62,6 +71,18 @@ class GGXTilts(Tilts):
 
     distribution = GGX
 
+    def densities(self, tilts: list[tuple[Any, Any]]) -> list:
+        """D = alpha^2 / (pi (sin^2 a + alpha^2 cos^2 a)^2), by a division for every four."""
+        square = dr.square(self.alpha)
+        scale, roots = square * dr.inv_pi * self.scale, [dr.fma(square, cos * cos, sin * sin) for sin, cos in tilts]
+        inverse = [x for n in range(0, len(roots), 4) for x in reciprocals(*roots[n : n + 4])]
+        return [scale * dr.square(x) for x in inverse]
+
+    def steepness(self) -> Any:
+        """From the form above."""
+        square = dr.square(self.alpha)
+        return (4 - 4 * square) / (12.5 + square)
+
     @staticmethod
     def isotropic_partner(alpha: Any) -> Any:
         """A quarter of the roughness."""
@@ -83,6 +104,10 @@ class BeckmannTilts(Tilts):
 
     distribution = Beckmann
 
+    def steepness(self) -> Any:
+        """That of the exponential."""
+        return 25 / dr.square(self.alpha) - 4
+
     @staticmethod
     def isotropic_partner(alpha: Any) -> Any:
         """An integral of a Gaussian."""
@@ -102,6 +127,10 @@ class PhongTilts(Tilts):
     """Of Phong."""
 
     distribution = Phong
+
+    def steepness(self) -> Any:
+        """The exponent."""
+        return Phong.exponent(self.alpha)
 
     @staticmethod
     def isotropic_partner(alpha: Any) -> Any:
