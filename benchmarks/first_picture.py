@@ -74,12 +74,12 @@ def main() -> None:
             mine = [seconds for other, seconds in runs if other == label]
             found[name][label] = {clock: min(run[clock] for run in mine) for clock in ("cpu", "wall")}
         print(row(name, found[name], width), flush=True)
+        if asked.json:
+            asked.json.write_text(json.dumps(found, indent=1))
     ratios = {name: x["now"]["cpu"] / x["before"]["cpu"] for name, x in found.items() if "before" in x}
     for name, ratio in ratios.items():
         if ratio > SLOWER:
             print(f"{name} is {ratio:.2f} times as slow: {SLOWER} are allowed.")
-    if asked.json:
-        asked.json.write_text(json.dumps(found, indent=1))
 
 
 def names() -> list[str]:
@@ -89,7 +89,7 @@ def names() -> list[str]:
 
 def row(name: str, times: dict, width: int) -> str:
     """A line of the table."""
-    cells = (f"{times[x]['cpu']:6.1f} ({times[x]['wall']:5.1f})" if x in times else "-" for x in ("before", "now"))
+    cells = (f"{times[x]['cpu']:6.2f} ({times[x]['wall']:6.2f})" if x in times else "-" for x in ("before", "now"))
     ratio = f"{times['now']['cpu'] / times['before']['cpu']:.2f}" if "before" in times else ""
     return f"{name:{width}}  " + "  ".join(f"{cell:>14}" for cell in cells) + f"  {ratio:>12}"
 
