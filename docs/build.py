@@ -145,7 +145,7 @@ def main() -> None:
     import asperity  # noqa: F401  (before Mitsuba)
     from asperity.models import MODELS
 
-    report = json.loads(SPEED.read_text())
+    report = json.loads(SPEED.read_text())  # by `python benchmarks/speed.py --json docs/speed.json`
     for name, model in MODELS.items():
         page = DOCS / f"{name}.md"
         page.write_text(with_speed(with_table(page.read_text(), model), name, report))
