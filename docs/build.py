@@ -1,15 +1,22 @@
 """Writes what in the documentation comes from the code: `python docs/build.py [--pictures]`.
 
-The parameter tables always (a test holds them to the declarations), the pictures on request: they take three minutes.
+The parameter tables, and those of speed from `speed.json`, always (a test holds them to the declarations and to that
+file); the pictures on request: they take three minutes.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
+from textwrap import fill
 
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- parameters: made by docs/build.py -->", "<!-- end of parameters -->"
+BEGIN_SPEED, END_SPEED = "<!-- speed: made by docs/build.py -->", "<!-- end of speed -->"
+SPEED = DOCS / "speed.json"
+CALLS, FRAMES = ("eval_pdf", "sample"), ("bare", "preview", "filled")
+"""Columns of `speed.json`: nanoseconds, and seconds."""
 MACBETH = {"orange": (214, 126, 44), "blue flower": (133, 128, 177), "bluish green": (103, 189, 170)}
 """Patches of the ColorChecker, as its maker gives them: sRGB of 8 bits."""
 INDICES = (1.0, 1.2, 1.33, 1.5)
@@ -25,8 +32,43 @@ def table(model) -> str:
 
 def with_table(page: str, model) -> str:
     """The page with the model's table between the marks."""
-    before, rest = page.split(BEGIN)
-    return f"{before}{BEGIN}\n{table(model)}\n{END}{rest.split(END)[1]}"
+    return between(page, BEGIN, table(model), END)
+
+
+def between(page: str, begin: str, text: str, end: str) -> str:
+    """The page with this text between the marks."""
+    before, rest = page.split(begin)
+    return f"{before}{begin}\n{text}\n{end}{rest.split(end)[1]}"
+
+
+def speed_table(name: str, report: dict) -> str:
+    """Times of a model's calls and frames, in Markdown, from what `benchmarks/speed.py --json` wrote."""
+    rows = {row: found for row, found in report["rows"].items() if row.split(",")[0] == name}
+    reference = next(iter(rows.values()))["against"]
+    heads = [f"`{call}`, ns" for call in CALLS] + [f"frame, *{scene}*" for scene in FRAMES]
+    lines = ["| | " + " | ".join(heads) + " |", "|" + "---|" * (len(heads) + 1)]
+    for row, found in {reference: report["rows"][reference], **rows}.items():
+        cells = [f"{found[call]['time'][1]:.2g}" for call in CALLS]
+        cells += ["1" if row == reference else spread(found[scene]["ratio"]) for scene in FRAMES]
+        lines.append(f"| {row if row == reference else row.removeprefix(f'{name}, ')} | " + " | ".join(cells) + " |")
+    note = (
+        "`python benchmarks/speed.py`, one process, {threads} threads of {machine}: medians of {rounds} rounds in "
+        "which all take turns, ± half the distance of the quartiles. Frames of {size} x {size} pixels over those of "
+        "the first row; calls by the lane, of {lanes} random directions. Mitsuba {mitsuba}, Dr.Jit {drjit}, LLVM "
+        "{llvm}; commit {commit}."
+    )
+    return "\n".join([*lines, "", fill(note.format(**report), 120)])
+
+
+def spread(quartiles: list[float]) -> str:
+    """Median and half the distance of the others."""
+    low, middle, high = quartiles
+    return f"{middle:.2f} ± {(high - low) / 2:.2f}"
+
+
+def with_speed(page: str, name: str, report: dict) -> str:
+    """The page with the speed of the model ``name`` between the marks, if it has marks."""
+    return between(page, BEGIN_SPEED, speed_table(name, report), END_SPEED) if BEGIN_SPEED in page else page
 
 
 def strip(path: Path, size: int = 256, spp: int = 256) -> None:
@@ -103,9 +145,10 @@ def main() -> None:
     import asperity  # noqa: F401  (before Mitsuba)
     from asperity.models import MODELS
 
+    report = json.loads(SPEED.read_text())  # by `python benchmarks/speed.py --json docs/speed.json`
     for name, model in MODELS.items():
         page = DOCS / f"{name}.md"
-        page.write_text(with_table(page.read_text(), model))
+        page.write_text(with_speed(with_table(page.read_text(), model), name, report))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         figures(DOCS / "pictures")

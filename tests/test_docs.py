@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import json
 import re
 from collections import defaultdict
 from pathlib import Path
@@ -27,6 +28,20 @@ def models():
 def test_parameter_tables_are_those_of_the_code(name):
     page = (ROOT / "docs" / f"{name}.md").read_text()
     assert build.with_table(page, models()[name]) == page, "run `python docs/build.py`"
+
+
+PAGES = {path.stem: path.read_text() for path in (ROOT / "docs").glob("*.md")}
+
+
+@pytest.mark.parametrize("name", [name for name, page in PAGES.items() if build.BEGIN_SPEED in page])
+def test_speed_tables_are_those_of_the_benchmark(name):
+    report = json.loads(build.SPEED.read_text())  # by `python benchmarks/speed.py --json docs/speed.json`
+    assert build.with_speed(PAGES[name], name, report) == PAGES[name], "run `python docs/build.py`"
+
+
+def test_all_models_that_were_timed_have_a_table_of_speed():
+    timed = {row.split(",")[0] for row in json.loads(build.SPEED.read_text())["rows"]} & models().keys()
+    assert timed == {name for name, page in PAGES.items() if build.BEGIN_SPEED in page}
 
 
 def test_readme_begins_with_a_picture_and_two_commands():

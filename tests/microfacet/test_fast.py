@@ -76,6 +76,16 @@ def test_exponential():
     np.testing.assert_allclose(value[x > -3], exact[x > -3], rtol=4e-6)
 
 
+@pytest.mark.parametrize("most, tolerance", [(1.5, 3e-6), (2.5, 1.6e-5)])
+def test_exponential_of_moderate_numbers(most, tolerance):
+    """Left out is 16 (x / 16)^5 / 5!, 1e-6 at 1.5, 1.2e-5 at 2.5; four squarings make 2e-6 of rounding."""
+    x = np.linspace(-most, most, N, dtype=np.float32)
+    value, slope = found(fast.exp_of_moderate, x)
+    exact = np.exp(x.astype(float))
+    np.testing.assert_allclose(value, exact, rtol=tolerance)
+    np.testing.assert_allclose(slope, exact, rtol=4 * tolerance)
+
+
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_reciprocals(count):
     x = 10 ** np.random.default_rng(count).uniform(-6, 6, (count, N))

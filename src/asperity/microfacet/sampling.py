@@ -10,6 +10,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from .fast import sincos
 from .numerics import ONE_BELOW
 
 ROUNDS = 8
@@ -26,7 +27,8 @@ def direction(x: Any, y: Any, z: Any) -> Any:
 
 def spherical(cos: Any, u: Any) -> Any:
     """The direction at this cosine with the z axis, at an azimuth given by ``u``."""
-    (sin_azimuth, cos_azimuth), sin = dr.sincos(2 * dr.pi * u), dr.safe_sqrt(1 - cos * cos)
+    # Half a turn back, into the range of these functions; and forth, by the sign.
+    (sin_azimuth, cos_azimuth), sin = sincos(2 * dr.pi * u - dr.pi), -dr.safe_sqrt(1 - cos * cos)
     return direction(sin * cos_azimuth, sin * sin_azimuth, cos)
 
 

@@ -8,14 +8,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers import float64
+from numpy.polynomial.polynomial import polyval
 
-from asperity.microfacet.fast import polynomial
 from asperity.models.lambertsphere import fit, transport
 
 ERRORS = {  # as the docstrings of transport.py have them; of both roots, that of c, too
     "H0": 6.2e-4, "H1": 1.9e-4, "H2": 4.7e-4, "ISOTROPIC": 4.7e-4, "CONSTANTS": (9e-6, 22e-6, 3e-6, 11e-6, 5e-5, 5e-5),
     "ESCAPE": 6e-6, "ROOT": (5e-7, 9.1e-7), "BOND_ALBEDO": 1.1e-7, "ISOTROPIC_ROOT": (4.1e-9, 7e-9),
-    "ISOTROPIC_BOND_ALBEDO": 2e-9, "INVERSE": 8e-5,
+    "ISOTROPIC_BOND_ALBEDO": 2e-9, "LOGARITHM": 1e-5, "ONCE": 1.1e-6, "INVERSE": 8e-5,
 }  # fmt: skip
 
 # The exact solution.
@@ -98,25 +99,33 @@ def errors(tables):
     s, mu, h, constants, escape, bond, isotropic = exact()
     c, log, cos = 1 - s * s, mu * np.log(1 + 1 / mu), np.cos(np.linspace(0, np.pi, 1000))
     y = np.array([max(1 - transport.phase_cdf(x), 0) for x in cos.tolist()]) ** 0.4
+    x = np.linspace(0.01, np.pi / 2, 1000)
+    once = (1 - np.cos(x)) ** 1.5
 
     def logarithm(table):
-        return transport.log_h((log, mu, log * mu, mu * mu), s[:, None], table)
+        *features, roots = (float64(x.ravel()) for x in np.broadcast_arrays(log, mu, log * mu, mu * mu, s[:, None]))
+        return np.array(transport.log_h(features, roots, table)).reshape(len(s), len(mu))
+
+    def rational(x, table):
+        return np.array(transport.rational(float64(x), table))
 
     def over_c(name, exact):
-        return np.array([np.abs(c * polynomial(s, row) - x).max() for row, x in zip(tables[name], exact)])
+        return np.array([np.abs(c * polyval(s, row) - x).max() for row, x in zip(tables[name], exact)])
 
     def of_root(name, bond):
-        found = transport.rational(bond, tables[name])
+        found = rational(bond, tables[name])
         return np.array([np.abs(found - s).max(), np.abs(found**2 - s**2).max()])
 
     return {name: np.abs(np.exp(logarithm(tables[name])) / exact - 1).max() for name, exact in h.items()} | {
         "CONSTANTS": over_c("CONSTANTS", constants),
         "ESCAPE": over_c("ESCAPE", escape),
         "ROOT": of_root("ROOT", bond),
-        "BOND_ALBEDO": np.abs(transport.rational(s, tables["BOND_ALBEDO"]) - bond).max(),
+        "BOND_ALBEDO": np.abs(rational(s, tables["BOND_ALBEDO"]) - bond).max(),
         "ISOTROPIC_ROOT": of_root("ISOTROPIC_ROOT", isotropic),
-        "ISOTROPIC_BOND_ALBEDO": np.abs(transport.rational(s, tables["ISOTROPIC_BOND_ALBEDO"]) - isotropic).max(),
-        "INVERSE": np.abs(y * polynomial(y, tables["INVERSE"][0]) - (1 - cos)).max(),
+        "ISOTROPIC_BOND_ALBEDO": np.abs(rational(s, tables["ISOTROPIC_BOND_ALBEDO"]) - isotropic).max(),
+        "LOGARITHM": np.abs(np.sqrt(mu) * polyval(mu**0.25, tables["LOGARITHM"][0]) - log).max(),
+        "ONCE": np.abs(once * polyval(1 - np.cos(x), tables["ONCE"][0]) / (np.sin(x) - x * np.cos(x)) - 1).max(),
+        "INVERSE": np.abs(y * polyval(y, tables["INVERSE"][0]) - (1 - cos)).max(),
     }
 
 

@@ -56,6 +56,17 @@ def test_phase_function_has_its_moments():
     assert lobe.sum() == pytest.approx(1, abs=1e-12)
 
 
+@pytest.mark.parametrize("number, tolerance", [(llvm.Float, 2e-6), (llvm.Float64, 1.1e-6)])
+def test_fast_phase_function_is_the_phase_function(number, tolerance):
+    """To the fit's error, and in float32 rounding, at all angles; 0 at cos = 1, and beyond."""
+    cos = np.concatenate([np.linspace(-1, 1, 100_001), 1 - np.geomspace(1e-4, 1, 1000)]).astype(np.float32)
+    exact = np.array(transport.phase(float64(cos)))
+    np.testing.assert_allclose(
+        np.array(transport.fast_phase(number(cos)), dtype=float), exact, rtol=tolerance, atol=1e-12
+    )
+    assert transport.fast_phase(number(1 + 1e-6))[0] == 0
+
+
 def test_distribution_is_the_integral_of_the_density():
     t, weights = gauss(40)
     for cos in (-0.9, -0.2, 0.5, 1.0):

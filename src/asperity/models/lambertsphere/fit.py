@@ -3,11 +3,11 @@
 Prints them, ready to paste, with their errors and with those of the digits in transport.py. Needs half a minute;
 nothing imports this module when rendering.
 
-The digits in transport.py are not those printed: they are of an earlier fit of the same forms, whose script is lost.
-Those printed have the smallest largest error that the forms allow: .5 to 35 % smaller for H, up to a factor of three
-for the constants. They are no better in the BRDF, where scattering of higher order is a difference that is small for
-small c: at c = .99 it errs by .05 % rms instead of .07 %, but at c = .2 by .10 % instead of .05 %, and at the horizon
-there by 5 % instead of 2 %. So the old digits stay.
+The digits in transport.py, but for LOGARITHM and ONCE, are not those printed: they are of an earlier fit of the same
+forms, whose script is lost. Those printed have the smallest largest error that the forms allow: .5 to 35 % smaller for
+H, up to a factor of three for the constants. They are no better in the BRDF, where scattering of higher order is a
+difference that is small for small c: at c = .99 it errs by .05 % rms instead of .07 %, but at c = .2 by .10 % instead
+of .05 %, and at the horizon there by 5 % instead of 2 %. So the old digits stay.
 
 Paper (d'Eon 2021)            Here
 c, s = sqrt(1 - c)            ``c``, `S`: everything is smooth in s, and is solved at these
@@ -35,6 +35,7 @@ from __future__ import annotations
 from math import factorial
 from typing import NamedTuple
 
+import drjit as dr
 import numpy as np
 from numpy.polynomial.polynomial import polyfit
 from scipy.optimize import linprog
@@ -194,6 +195,8 @@ def tables() -> dict[str, list[Fit]]:
         "BOND_ALBEDO": [fit_rational(S, bond, transport.BOND_ALBEDO)],
         "ISOTROPIC_ROOT": [fit_rational(isotropic_bond, S, transport.ISOTROPIC_ROOT)],
         "ISOTROPIC_BOND_ALBEDO": [fit_rational(S, isotropic_bond, transport.ISOTROPIC_BOND_ALBEDO)],
+        "LOGARITHM": [fit_logarithm(transport.LOGARITHM)],
+        "ONCE": [fit_once(transport.ONCE)],
         "INVERSE": [fit_inverse(transport.INVERSE)],
     }
 
@@ -209,6 +212,20 @@ def fit_h(characteristics: list[np.ndarray], table: transport.Table) -> Fit:
 def fit_over_c(values: np.ndarray, row: tuple[float, ...]) -> Fit:
     """c times a polynomial in s."""
     return linear((1 - S**2)[:, None] * np.vander(S, len(row), increasing=True), values, (row,))
+
+
+def fit_logarithm(table: transport.Table) -> Fit:
+    """mu log(1 + 1 / mu) over sqrt(mu), by powers of mu^(1/4)."""
+    root = 0.55 - 0.45 * np.cos(np.linspace(0, np.pi, 400))  # from GRAZING^(1/4) on
+    values = root**4 * np.log(1 + root**-4)
+    return linear(root[:, None] ** 2 * np.vander(root, len(table[0]), increasing=True), values, table)
+
+
+def fit_once(table: transport.Table) -> Fit:
+    """(sin x - x cos x) / y^(3/2) by powers of y = 1 - cos x, which is an integral of sqrt(t (1 - y t / 2))."""
+    y = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, 400))
+    values = 8**0.5 / 3 * hyp2f1(0.5, 0.5, 2.5, y / 2)
+    return linear(np.vander(y, len(table[0]), increasing=True) / values[:, None], np.ones_like(y), table)
 
 
 def fit_inverse(table: transport.Table) -> Fit:
@@ -229,7 +246,8 @@ def fit_rational(x: np.ndarray, values: np.ndarray, table: transport.Table) -> F
         best = rounded(chebyshev(columns, (values - (1 - x)) / bottom))
         rows = tuple((1.0, *half) for half in np.split(best, 2))
         bottom = powers @ rows[1]
-    error, present = (float(np.abs(transport.rational(x, pair) - values).max()) for pair in (rows, table))
+    at = dr.scalar.ArrayXf64(x)
+    error, present = (float(np.abs(np.array(transport.rational(at, pair)) - values).max()) for pair in (rows, table))
     return Fit(rows, error, present)
 
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import drjit as dr
 
+from ...microfacet.fast import angles, greater, lesser, polynomial, reciprocals, sincos
 from ...microfacet.ggx import inclination, lift, to_sphere
 from ...microfacet.numerics import TINY, heading, keep, log1p, one_minus_exp
-from .shadows import silhouette
 
 
 @dataclass
@@ -60,6 +60,15 @@ def density(tau_0: Any) -> Any:
 
 FEWEST = 1e-15
 """Filling factor that stands for 0: its reciprocal's square is still a float32."""
+START = (
+    (0.3538207, -3.039518, 6.668182, -4.375297),
+    (4.001753, 17.71606, -75.05818, 61.26879),
+    (-10.7812, -38.88744, 221.591, -197.8905),
+    (14.1767, 37.90167, -258.1943, 240.5411),
+    (-6.218939, -13.70831, 105.1445, -99.72404),
+)
+"""alpha of `_visible_height` by powers of q^(1/4) (from the first on, rows) and cos^(1/2) (columns). What counts is the
+share of the visible area that one Halley step from there is off: 3e-5 at most, for all r and cosines from .001 to 1."""
 
 
 @dataclass
@@ -101,70 +110,84 @@ def sample_visible_normal(r: Any, w: Any, u: Any, v: Any) -> Any:
     [0, 1).
     """
     sin, cos = inclination(w)
-    h = _visible_height(r, sin, cos, u)
-    radius = dr.safe_sqrt((1 - h) * (1 + h))
-    sin_azimuth, cos_azimuth = _visible_azimuth(sin, cos, h, radius, v)
+    h, radius, sin_alpha, gamma = _visible_height(r, sin, cos, u)
+    sin_azimuth, cos_azimuth = _visible_azimuth(cos * h, sin * radius, sin * sin_alpha, dr.pi - gamma, v)
     x, y = heading(w.x, w.y)
     return type(w)(radius * (x * cos_azimuth - y * sin_azimuth), radius * (y * cos_azimuth + x * sin_azimuth), h)
 
 
-def _visible_height(r: Any, sin: Any, cos: Any, u: Any) -> Any:
-    """Height h in [0, 1] above which lies the share ``u`` of the visible area: 1 - exp(-r sigma(h)) = u tau_i.
+def _visible_height(r: Any, sin: Any, cos: Any, u: Any) -> tuple[Any, Any, Any, Any]:
+    """(h, R, sin alpha, gamma): the height above which lies the share ``u`` of the visible area, and the ring there.
 
-    sigma(h) = pi (1 - h^2) + sigma_s(h) is the area that a grain's part above h covers or shades on the plane.
+    1 - exp(-r sigma(h)) = u tau_i, where sigma(h) = pi (1 - h^2) + sigma_s(h) is the area that a grain's part above h
+    covers or shades on the plane.
     """
-    whole = dr.pi / 2 * (1 + 1 / cos)  # sigma(0)
-    sigma = -log1p(-u * one_minus_exp(r * whole)) / r
-    # Above h = sin there is no shadow, and the inverse is a root; below, the unknown is alpha: h = sin cos(alpha).
-    unshaded = dr.pi * cos * cos  # sigma(sin)
+    # Above h = sin there is no shadow. sigma(sin) = pi cos^2, and sigma(0) = pi / 2 (1 + 1 / cos) is more by
+    # pi / (2 cos) times this:
+    difference = greater((1 - cos) * polynomial(cos, (1, 2, 2)), 1e-12)
+    per_cos, per_r, per_difference = reciprocals(cos, r, difference)
+    sigma = -log1p(-u * one_minus_exp(r * (dr.pi / 2) * (1 + per_cos))) * per_r
+    q = lesser((sigma - dr.pi * cos * cos) * (2 / dr.pi) * cos * per_difference, 1)
+    # Without shadow, the inverse is a root; else the unknown is alpha: h = sin cos(alpha).
+    shaded, unshaded_square = q > 0, sigma * dr.inv_pi  # R^2 = 1 - h^2
+    root = dr.sqrt(dr.select(shaded, q, greater(1 - unshaded_square, 0)))
+    fourth = dr.sqrt(root)
+    start = fourth * polynomial(fourth, [polynomial(dr.sqrt(cos), row) for row in START])
 
     def area(alpha: Any, sin_alpha: Any, cos_alpha: Any) -> tuple[Any, Any, Any]:  # and its derivatives by alpha
-        h = sin * cos_alpha
-        gamma = dr.atan2(sin_alpha, cos * cos_alpha + TINY)
-        value = (dr.pi - gamma) * (1 - h * h) + (alpha - h * sin * sin_alpha) / cos
+        h, x = sin * cos_alpha, cos * cos_alpha
+        gamma, per_radius = _gamma(x, sin_alpha, dr.square(x) + dr.square(sin_alpha))
+        lit, slope = dr.pi - gamma, cos * dr.square(per_radius)  # that of gamma
+        value = lit * (1 - h * h) + (alpha - h * sin * sin_alpha) * per_cos
         # d sigma/dh = -width / cos, where width is the ring at height h as seen along w: int (w.m')+ over the azimuth.
-        width = 2 * (cos * h * (dr.pi - gamma) + sin * sin_alpha)
-        gamma_slope = cos / (sin_alpha * sin_alpha + cos * cos * cos_alpha * cos_alpha + TINY)
-        width_slope = 2 * (sin * cos_alpha - cos * sin * sin_alpha * (dr.pi - gamma) - cos * h * gamma_slope)
-        return value, sin / cos * width * sin_alpha, sin / cos * (width_slope * sin_alpha + width * cos_alpha)
+        width = 2 * (cos * h * lit + sin * sin_alpha)
+        width_slope = 2 * (sin * cos_alpha - cos * sin * sin_alpha * lit - cos * h * slope)
+        tan = sin * per_cos
+        return value, tan * width * sin_alpha, tan * (width_slope * sin_alpha + width * cos_alpha)
 
-    q = dr.clip((sigma - unshaded) / dr.maximum(whole - unshaded, 1e-12), 0, 1)
-    # Of q, alpha is a square root at normal and a cube root at grazing incidence, where q is small.
-    start = dr.pi / 2 * (cos * dr.sqrt(q) + (1 - cos) * dr.power(q + TINY, 1 / 3))
-    _, cos_alpha = _invert(area, sigma, start, dr.pi / 2)
-    return dr.select(sigma <= unshaded, dr.safe_sqrt(1 - sigma / dr.pi), sin * dr.maximum(cos_alpha, 0))
+    sin_alpha, cos_alpha = _invert(area, sigma, start, dr.pi / 2, steps=1)
+    sin_alpha, cos_alpha = dr.select(shaded, sin_alpha, 0), greater(cos_alpha, 0)
+    square = dr.select(shaded, dr.square(cos * cos_alpha) + dr.square(sin_alpha), unshaded_square)
+    gamma, per_radius = _gamma(cos * cos_alpha, sin_alpha, square)
+    return dr.select(shaded, sin * cos_alpha, root), square * per_radius, sin_alpha, gamma
 
 
-def _visible_azimuth(sin: Any, cos: Any, h: Any, radius: Any, v: Any) -> tuple[Any, Any]:
+def _gamma(x: Any, sin_alpha: Any, square: Any) -> tuple[Any, Any]:
+    """(gamma, 1 / R): R cos(gamma) = cos cos(alpha) = ``x``, R sin(gamma) = sin(alpha), R^2 = ``square``."""
+    per_radius = dr.rsqrt(square + TINY)
+    (gamma,) = angles((x * per_radius, sin_alpha * per_radius))
+    return gamma, per_radius
+
+
+def _visible_azimuth(a: Any, b: Any, b_sin_limit: Any, limit: Any, v: Any) -> tuple[Any, Any]:
     """Sine and cosine of an azimuth x about ``w`` with density proportional to (w.m')+ = (a + b cos x)+.
 
-    ``radius`` is that of the ring at height ``h``. ``v`` chooses the side, and what is left of it the point.
+    It vanishes at the ``limit``, phi_q. ``v`` chooses the side, and what is left of it the point.
     """
-    a, b = cos * h, sin * radius
-    _, sin_alpha, gamma = silhouette(sin, cos, h)
-    limit = dr.pi - gamma  # phi_q, where w.m' is zero; b sin(limit) = sin sin(alpha)
     side, v = dr.select(v < 0.5, -1.0, 1.0), dr.abs(2 * v - 1)
 
     def distribution(x: Any, sin_x: Any, cos_x: Any) -> tuple[Any, Any, Any]:  # and its derivatives by x
-        return a * x + b * sin_x, dr.maximum(a + b * cos_x, 0), -b * sin_x
+        return a * x + b * sin_x, greater(a + b * cos_x, 0), -b * sin_x
 
     # Where a < b the density vanishes linearly at the limit, so the distribution ends in a square root.
     start = limit * (1 - dr.sqrt(1 - v))
-    sin_x, cos_x = _invert(distribution, v * (a * limit + sin * sin_alpha), start, limit)
+    sin_x, cos_x = _invert(distribution, v * (a * limit + b_sin_limit), start, limit, steps=2)
     return side * sin_x, cos_x
 
 
-def _invert(f: Callable[[Any, Any, Any], tuple[Any, Any, Any]], value: Any, x: Any, high: Any) -> tuple[Any, Any]:
-    """Sine and cosine of the angle in [0, high] at which ``f`` has the ``value``, by two Halley steps from ``x``.
+def _invert(
+    f: Callable[[Any, Any, Any], tuple[Any, Any, Any]], value: Any, x: Any, high: Any, steps: int
+) -> tuple[Any, Any]:
+    """Sine and cosine of the angle in [0, high] at which ``f`` has the ``value``, by Halley steps from ``x``.
 
     ``f(x, sin x, cos x)`` gives a value and its first two derivatives.
     """
-    sin, cos = dr.sincos(x)
-    for _ in range(2):
+    sin, cos = sincos(x)
+    for _ in range(steps):
         found, slope, bend = f(x, sin, cos)
         error = found - value
-        step = -2 * error * slope / dr.maximum(2 * slope * slope - error * bend, TINY)
-        turned = dr.clip(x + step, 0, high)
+        step = -2 * error * slope * dr.rcp(greater(2 * slope * slope - error * bend, TINY))
+        turned = lesser(greater(x + step, 0), high)
         sin, cos = _turn(sin, cos, turned - x)
         x = turned
     return sin, cos
@@ -176,6 +199,6 @@ def _turn(sin: Any, cos: Any, angle: Any) -> tuple[Any, Any]:
     A Halley step that long is the first of two; its error is forgiven by the next.
     """
     square = angle * angle
-    s = angle * (1 - square / 6 * (1 - square / 20 * (1 - square / 42)))
-    c = 1 - square / 2 * (1 - square / 12 * (1 - square / 30))
+    s = angle * polynomial(square, (1, -1 / 6, 1 / 120, -1 / 5040))
+    c = polynomial(square, (1, -1 / 2, 1 / 24, -1 / 720))
     return sin * c + cos * s, cos * c - sin * s
