@@ -32,8 +32,9 @@ from typing import Any
 
 import drjit as dr
 
+from ...microfacet.fast import acute_angle, angle, greater, lesser
 from ...microfacet.ggx import inclination
-from ...microfacet.numerics import TINY
+from ...microfacet.numerics import SHORTEST, TINY, normalised
 
 
 def silhouette(sin: Any, cos: Any, h: Any) -> tuple[Any, Any, Any]:
@@ -42,112 +43,130 @@ def silhouette(sin: Any, cos: Any, h: Any) -> tuple[Any, Any, Any]:
     cos alpha = h / sin; alpha and gamma are 0 if there is no shadow.
     """
     cos_alpha = dr.minimum(h / sin, 1)
-    sin_alpha = _sine(cos_alpha)
+    sin_alpha = dr.safe_sqrt((1 - cos_alpha) * (1 + cos_alpha))
     return cos_alpha, sin_alpha, dr.atan2(sin_alpha, cos * cos_alpha + TINY)
 
 
 def shadow(w: Any, h: Any) -> Any:
     """Area sigma_s of the shadow along ``w`` on the plane at height ``h`` (Lucas 2024, Appendix A)."""
-    sin, cos = inclination(w)
-    cos_alpha, sin_alpha, gamma = silhouette(sin, cos, h)
-    alpha = dr.atan2(sin_alpha, cos_alpha + TINY)
-    return dr.maximum(_beyond_disc(h, sin, cos, alpha, sin_alpha, gamma), 0)
+    return Outline.of(w).at(h).area()
 
 
-def _beyond_disc(h: Any, sin: Any, cos: Any, psi: Any, sin_psi: Any, eta: Any) -> Any:
-    """Twice the area between disc and outline from the shadow's deepest point to ``psi``: sigma_e - sigma_t - sigma_c.
-
-    The whole shadow is twice what is between 0 and alpha. The last three arguments may be sums over several ``psi``.
-    """
-    # Those of the ellipse are taken in the cylinder's cross-section, which the plane stretches by 1 / cos.
-    ellipse_sector, triangle = psi, h * sin * sin_psi
-    disc_sector = (1 - h * h) * eta
-    return (ellipse_sector - triangle) / cos - disc_sector
+def root(square: Any) -> Any:
+    """Its root, or next to 0, without a derivative, where rounding has made it negative or 0."""
+    return dr.sqrt(greater(square, NOTHING))
 
 
-@dataclass
-class Shadows:
-    """The two shadows along ``i`` and ``o``, which may overlap (Lucas 2024, Appendix B).
-
-    The ray from the disc's centre through the crossing of the outlines parts their union in two: on either side it is
-    the shadow that reaches further there. Clipping the crossing to the silhouette points yields the paper's three cases
-    without telling them apart.
-    """
-
-    i: Any
-    o: Any
-    outlines: Any = None  # both `Outline`s, made from i and o
-
-    def __post_init__(self) -> None:
-        if self.outlines is not None:  # a copy of Dr.Jit's, in a loop
-            return
-        # The difference first: i.o and cross products lose all digits near retro-reflection. That of unit vectors is at
-        # right angles to their sum; what is not is rounding, which may be all there is of the longest component.
-        d, both = self.i - self.o, self.i + self.o
-        d = d - both * (dr.dot(d, both) / dr.squared_norm(both))
-        cross, K = dr.abs(self.i.x * d.y - self.i.y * d.x), dr.squared_norm(d) / 2  # |(i x o).n|, 1 - i.o
-        self.outlines = Outline.of(self.i, d, cross, K), Outline.of(self.o, -d, cross, K)
-
-    def union(self, h: Any) -> Any:
-        """Area shaded along ``i`` or ``o`` on the plane at height ``h``: sigma_i + sigma_o - sigma_cap (Eq. 18)."""
-        return dr.maximum(sum(outline.own_part(h) for outline in self.outlines), 0)
-
-    def sum(self, h: Any) -> Any:
-        """Area of both shadows, their overlap counted twice: sigma_i + sigma_o (Eq. 17)."""
-        return shadow(self.i, h) + shadow(self.o, h)
+NOTHING = 1e-30
 
 
 @dataclass
 class Outline:
-    """The outline of one of two shadows, and where it crosses the other's: what does not depend on the height.
+    """The outline of a shadow on any plane: the direction's angle with the normal, and reciprocals."""
 
-    A point p of the plane is on both outlines where p.(i - o) = 0. In psi that is linear, B cos(psi) - A sin(psi) = K h
-    with K = 1 - i.o, or cos(psi + axis) = level h, where axis is the angle of (B, A).
-    """
-
-    sin: Any  # of the direction's angle with the normal
+    sin: Any
     cos: Any
-    level: Any  # K / |(A, B)|
-    sin_axis: Any
-    cos_axis: Any
+    per_sin: Any
+    per_cos: Any
 
     @classmethod
-    def of(cls, w: Any, d: Any, cross: Any, K: Any) -> Outline:
-        """That of the shadow along ``w``; ``d`` is w minus the other direction, ``cross`` is |(i x o).n|."""
+    def of(cls, w: Any) -> Outline:
+        """That of the shadow along ``w``."""
         sin, cos = inclination(w)
-        # A and B, times sin. 1e-12: where i = o, both outlines cross at their deepest points.
-        A, B = cos * cross + 1e-12, w.x * d.x + w.y * d.y
-        scale = dr.rsqrt(A * A + B * B)
-        return cls(sin, cos, K * sin * scale, A * scale, B * scale)
+        return cls(sin, cos, 1 / sin, 1 / cos)
 
-    def own_part(self, h: Any) -> Any:
-        """Area of the shadow from its silhouette point on the far side, psi = -alpha, to the crossing.
+    def at(self, h: Any) -> Cut:
+        """On the plane at height ``h``.
 
-        The angles come in sums, alpha + psi and gamma + eta, each of which is a single arc tangent.
+        The silhouette point is on the disc, whose radius is R = sqrt(1 - h^2): R sin(gamma) = sin(alpha), and R cos(gamma) = cos cos(alpha).
         """
-        sin, cos = self.sin, self.cos
-        cos_alpha = dr.minimum(h / sin, 1)
-        sin_alpha = _sine(cos_alpha)
-        cos_psi, sin_psi = self.crossing(h, cos_alpha, sin_alpha)
-        alpha_psi = _sum_of_angles(cos_alpha, sin_alpha, cos_psi, sin_psi)
-        gamma_eta = _sum_of_angles(cos * cos_alpha, sin_alpha, cos_psi - h * sin, cos * sin_psi)
-        return _beyond_disc(h, sin, cos, alpha_psi, sin_alpha + sin_psi, gamma_eta) / 2
+        cos_alpha, per_radius = lesser(h * self.per_sin, 1), dr.rsqrt(greater((1 - h) * (1 + h), SHORTEST))
+        sin_alpha = root((1 - cos_alpha) * (1 + cos_alpha))
+        cos_gamma, sin_gamma = lesser(self.cos * cos_alpha * per_radius, 1), sin_alpha * per_radius
+        return Cut(self, h, cos_alpha, sin_alpha, cos_gamma, sin_gamma, acute_angle(cos_gamma, sin_gamma))
 
-    def crossing(self, h: Any, cos_alpha: Any, sin_alpha: Any) -> tuple[Any, Any]:
+
+@dataclass
+class Cut:
+    """The outline of a shadow on the plane at height ``h``: its silhouette point."""
+
+    outline: Outline
+    h: Any
+    cos_alpha: Any
+    sin_alpha: Any
+    cos_gamma: Any
+    sin_gamma: Any
+    gamma: Any
+
+    def area(self) -> Any:
+        """sigma_s = sigma_e - sigma_t - sigma_c."""
+        alpha = acute_angle(self.cos_alpha, self.sin_alpha)
+        return greater(self.sector(alpha, self.sin_alpha) - (1 - self.h * self.h) * self.gamma, 0)
+
+    def sector(self, psi: Any, sin_psi: Any) -> Any:
+        """Twice the area that the ray from the disc's centre to the outline sweeps from psi = 0: sigma_e - sigma_t.
+
+        Arguments may be sums over several ``psi``.
+        """
+        # Those of the ellipse are taken in the cylinder's cross-section, which the plane stretches by 1 / cos.
+        return (psi - self.h * self.outline.sin * sin_psi) * self.outline.per_cos
+
+    def crossing(self, axis: tuple[Any, Any], cos_sum: Any, sin_sum: Any) -> tuple[Any, Any]:
         """(cos psi, sin psi) of the crossing p_+, clipped to [-alpha, alpha]."""
-        cos_sum = dr.minimum(self.level * h, 1)  # of psi + axis
-        sin_sum = _sine(cos_sum)
-        sin_psi = sin_sum * self.cos_axis - cos_sum * self.sin_axis
-        cos_psi = cos_sum * self.cos_axis + sin_sum * self.sin_axis
-        beyond = (cos_psi < 0) | (dr.abs(sin_psi) > sin_alpha)  # sines tell small angles apart, cosines do not
-        return dr.select(beyond, cos_alpha, cos_psi), dr.select(beyond, dr.copysign(sin_alpha, sin_psi), sin_psi)
+        sin_axis, cos_axis = axis
+        sin_psi = sin_sum * cos_axis - cos_sum * sin_axis
+        cos_psi = cos_sum * cos_axis + sin_sum * sin_axis
+        beyond = (cos_psi < 0) | (dr.abs(sin_psi) > self.sin_alpha)  # sines tell small angles apart, cosines do not
+        return (
+            dr.select(beyond, self.cos_alpha, cos_psi),
+            dr.select(beyond, dr.copysign(self.sin_alpha, sin_psi), sin_psi),
+        )
+
+    def own_sector(self, axis: tuple[Any, Any], cos_sum: Any, sin_sum: Any) -> Any:
+        """Twice the area swept from the silhouette point on the far side, psi = -alpha, to the crossing."""
+        cos_psi, sin_psi = self.crossing(axis, cos_sum, sin_sum)
+        cos = self.cos_alpha * cos_psi - self.sin_alpha * sin_psi  # alpha + psi, in a single arc
+        sin = greater(self.cos_alpha * sin_psi + self.sin_alpha * cos_psi, 0)
+        return self.sector(angle(cos, sin), self.sin_alpha + sin_psi)
 
 
-def _sine(cos: Any) -> Any:
-    """The sine of an angle in [0, pi], without cancellation where its cosine is near 1."""
-    return dr.safe_sqrt((1 - cos) * (1 + cos))
+@dataclass
+class Shadows:
+    i: Any
+    o: Any
+    parts: Any = None
+
+    def __post_init__(self) -> None:
+        if self.parts is not None:  # a copy of Dr.Jit's, in a loop
+            return
+        i, o = self.i, self.o
+        d, both = i - o, i + o
+        d = d - both * (dr.dot(d, both) / dr.squared_norm(both))
+        cross, K = dr.abs(i.x * d.y - i.y * d.x), dr.squared_norm(d) / 2  # |(i x o).n|, 1 - i.o
+        level = root(K / (2 * i.z * o.z + K))
+        cos, sin = normalised(i.x * o.x + i.y * o.y, cross + 1e-12)
+        self.parts = Outline.of(i), Outline.of(o), axis(i, d, cross), axis(o, -d, cross), level, angle(cos, sin), cos, sin
+
+    def at(self, h: Any) -> tuple[Cut, Cut]:
+        return self.parts[0].at(h), self.parts[1].at(h)
+
+    def union(self, h: Any) -> Any:
+        """Area shaded along ``i`` or ``o`` on the plane at height ``h``: sigma_i + sigma_o - sigma_cap (Eq. 18)."""
+        i, o = self.at(h)
+        *_, axis_i, axis_o, level, between, _, _ = self.parts
+        cos_sum = lesser(level * h, 1)
+        sin_sum = root((1 - cos_sum) * (1 + cos_sum))
+        both = i.gamma + o.gamma
+        disc = both + lesser(greater(between, dr.abs(i.gamma - o.gamma)), both)
+        whole = i.own_sector(axis_i, cos_sum, sin_sum) + o.own_sector(axis_o, cos_sum, sin_sum) - (1 - h * h) * disc
+        return greater(0.5 * whole, 0)
+
+    def sum(self, h: Any) -> Any:
+        """Area of both shadows, their overlap counted twice: sigma_i + sigma_o (Eq. 17)."""
+        i, o = self.at(h)
+        return i.area() + o.area()
 
 
-def _sum_of_angles(x: Any, y: Any, u: Any, v: Any) -> Any:
-    """Sum of the polar angles of (x, y) and (u, v), if that is in [0, pi]."""
-    return dr.atan2(dr.maximum(x * v + y * u, 0), x * u - y * v + TINY)
+def axis(w: Any, d: Any, cross: Any) -> tuple[Any, Any]:
+    """(sin, cos) of the angle of (B, A), see `Shadows`. 1e-12: where i = o, outlines cross at their deepest points."""
+    return normalised(w.z * cross + 1e-12, w.x * d.x + w.y * d.y)
