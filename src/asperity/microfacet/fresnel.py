@@ -8,8 +8,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from .fast import greater
-
 LEAST = 1e-24
 """Keeps the root's modulus off 0, at the critical angle without absorption; it shows at cosines below 3e-6 alone."""
 
@@ -23,13 +21,6 @@ class Dielectric:
     def __call__(self, cos: Any) -> Any:
         """Unpolarised reflectance at the cosine of incidence from outside."""
         return mi.fresnel(cos, self.eta)[0]
-
-    def through(self, cos: Any) -> Any:
-        """1 - F(cos)."""
-        eta2 = self.eta * self.eta
-        g = dr.sqrt(greater(cos * cos + (eta2 - 1), LEAST))
-        a, b = cos + g, eta2 * cos + g
-        return 2 * cos * g * (b * b + eta2 * (a * a)) * dr.rcp(dr.square(a * b))
 
 
 @dataclass

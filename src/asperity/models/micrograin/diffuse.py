@@ -34,8 +34,8 @@ HEIGHTS: Rule = (
 )
 """Nodes and weights in h, crowded at the top, which alone is seen at grazing: fitted (`fit`)."""
 RULES.add(HEIGHTS)
-FRONT = (0, 1), (0.54899, 0.837651), (0.930488, 0.428855)
-BACK = (0, 1.18493), (0.676057, 0.94237)
+FRONT = (0, 1), (0.514716, 0.923746), (0.911243, 0.485973)
+BACK = (0, 1.4346), (0.713981, 1.102812)
 """(node, weight) pairs on half a lit arc, the front one and the back one, which is mostly empty; fitted."""
 AROUND = 16, 8
 """Midpoints on either arc, of grains that are not round."""
@@ -77,11 +77,7 @@ def lambertian(
         visible = exp_of_negative(-r * (disc + shadow(rings.shadows.i, h)))
         return exposed * first, exposed * second, visible * lit
 
-    if isotropic and facet.alike_around:
-        terms = [[weight * part for part in at_height(h, (rings,))] for h, weight in zip(*HEIGHTS)]
-        first, second, pdf = map(sum, zip(*terms))
-    else:
-        first, second, pdf = integrate(at_height, HEIGHTS, (rings,), grains.r * wi.z)
+    first, second, pdf = integrate(at_height, HEIGHTS, (rings,), grains.r * wi.z)
     scale = grains.r * stretch_o / (dr.pi * i.z)
     return Integral(scale * first, scale * second, scale * pdf)
 
