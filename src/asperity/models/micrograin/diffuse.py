@@ -11,7 +11,7 @@ gives the density of this way to sample: a visible normal first, then the cosine
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -24,7 +24,7 @@ from ...microfacet.quadrature import RULES, Rule, integrate
 from ...microfacet.sampling import about, cosine_hemisphere, split
 from .grains import Grains
 from .material import Facet, Material
-from .shadows import Cut, Shadows, shadow
+from .shadows import Shadows
 
 HEIGHTS: Rule = (
     (0.9999997, 0.99984726, 0.99915907, 0.99757463, 0.99459839, 0.98910712, 0.97815752, 0.95715387)
@@ -67,14 +67,14 @@ def lambertian(
     """
     i, o = grains.to_sphere(wi), grains.to_sphere(wo)
     stretch_i, stretch_o = grains.stretch(wi), grains.stretch(wo)
-    rings = Rings(grains, Shadows(i, o), facet, isotropic, stretch_i, stretch_o)
+    rings = Rings(grains, facet, isotropic, Shadows(i, o), stretch_i, stretch_o)
 
     def at_height(h: Any, captured: tuple[Rings]) -> tuple[Any, Any, Any]:
         (rings,) = captured
         disc, r = dr.pi * (1 - h * h), rings.grains.r
         first, second, lit = rings.at(h)
         exposed = exp_of_negative(-r * (disc + shaded(rings.shadows, h)))
-        visible = exp_of_negative(-r * (disc + shadow(rings.shadows.i, h)))
+        visible = exp_of_negative(-r * (disc + rings.shadows.first(h)))
         return exposed * first, exposed * second, visible * lit
 
     first, second, pdf = integrate(at_height, HEIGHTS, (rings,), grains.r * wi.z)
@@ -84,104 +84,140 @@ def lambertian(
 
 @dataclass
 class Rings:
-    """Rings of a grain at any height: integrals over the azimuth x, from i towards o, of (i'.m')+ (o'.m')+ T / |E m'|.
+    """The rings of a grain: integrals over the azimuth x of (i'.m')+ (o'.m')+ T / |E m'| at any height.
 
-    i'.m' = i_z h + sin_i R cos(x) and o'.m' = o_z h + sin_o R cos(x - between), where R^2 = 1 - h^2.
+    With R^2 = 1 - h^2, and x counted from i towards o, i'.m' = i_z h + sin_i R cos(x) is positive for |x| < pi - gamma_i,
+    and o'.m' = o_z h + sin_o R cos(x - between) likewise. So what is dark of the ring are two arcs of half widths gamma
+    about pi and pi + between; what is lit is one arc, or two if light comes from behind and they are apart.
     """
 
     grains: Grains
-    shadows: Shadows
     facet: Facet
     isotropic: bool
+    shadows: Shadows
     stretch_i: Any  # |E wi|
     stretch_o: Any
+    axis: tuple[Any, Any] | None = None  # unit vector at x = 0
+    turn: Any = None  # 1 if x is counted counterclockwise, else -1
+
+    def __post_init__(self) -> None:
+        if self.axis is not None:  # a copy of Dr.Jit's, in a loop
+            return
+        i, o, shadows = self.shadows.i, self.shadows.o, self.shadows
+        self.turn = dr.select(i.x * o.y < i.y * o.x, type(i.x)(-1), 1)
+        # The more inclined of both has an azimuth; that of the other follows, although it may be upright.
+        inclined = i.z < o.z
+        x, y = heading(dr.select(inclined, i.x, o.x), dr.select(inclined, i.y, o.y))
+        back_x, back_y = _rotated(x, y, shadows.cos_between, -self.turn * shadows.sin_between)
+        self.axis = dr.select(inclined, x, back_x), dr.select(inclined, y, back_y)
 
     def at(self, h: Any) -> tuple[Any, Any, Any]:
         """Integrals for the first albedo, for the second, and without T."""
-        i, o = self.shadows.at(h)
-        product = self.product(h, i, o)
-        facet = self.facet
+        product, facet = self.product(h), self.facet
         if self.isotropic and facet.alike_around:
             lit = product * dr.rsqrt(dr.square(self.grains.beta_x) * (1 - h * h) + h * h)
             second = facet.second(h, None) * lit if facet.second else 0 * lit
             return lit - second, second, lit
-        value, second, lit = self.means(h, i, o)
+        value, second, lit = self.means(h)
         return product * (value - second), product * second, product * lit
 
-    def product(self, h: Any, i: Cut, o: Cut) -> Any:
-        """Integral of (i'.m')+ (o'.m')+, in closed form."""
-        *_, between, cos, sin = self.shadows.parts
-        R2, hR = 1 - h * h, h * dr.sqrt((1 - h) * (1 + h))
-        sines = i.outline.sin * o.outline.sin
-        k1 = h * h * (i.outline.cos * o.outline.cos) + R2 / 2 * (sines * cos)
-        k2, k3, k4 = hR * (i.outline.cos * o.outline.sin), hR * (o.outline.cos * i.outline.sin), R2 / 4 * sines
-        odd_i = k1 * i.gamma + i.sin_gamma * (2 * k4 * cos * i.cos_gamma - k2 * cos - k3)
-        odd_o = k1 * o.gamma + o.sin_gamma * (2 * k4 * cos * o.cos_gamma - k3 * cos - k2)
-        both = 2 * k4 * (i.cos_gamma * i.cos_gamma + o.cos_gamma * o.cos_gamma - 1) - k2 * i.cos_gamma - k3 * o.cos_gamma
-        partial = k1 * between + sin * both
-        less = odd_i - odd_o
-        x = dr.select(between > i.gamma + o.gamma, odd_i + odd_o, partial)
-        x = dr.select(between < dr.abs(i.gamma - o.gamma), dr.select(i.gamma > o.gamma, less, -less), x)
-        return greater(2 * dr.pi * k1 - (odd_i + odd_o + x), 0)
+    def product(self, h: Any) -> Any:
+        """Integral of (i'.m')+ (o'.m')+, in closed form: that of the whole ring, less that of its dark arcs.
 
-    def means(self, h: Any, i: Cut, o: Cut) -> tuple[Any, Any, Any]:
-        """Means over the azimuth, weighted by (i'.m')+ (o'.m')+, of T / |E m'|, of the second's, and without T."""
-        facet, grains = self.facet, self.grains
-        Vector: Any = type(self.shadows.i)
-        total, value, second, lit = TINY, 0, 0, 0
-        for x, y, weight in self.nodes(h, i, o):
-            q_i = greater(self.shadows.i.x * x + self.shadows.i.y * y + self.shadows.i.z * h, 0)
-            q_o = greater(self.shadows.o.x * x + self.shadows.o.y * y + self.shadows.o.z * h, 0)
-            m_x, m_y = grains.beta_x * x, grains.beta_y * y
-            length = dr.rsqrt(m_x * m_x + m_y * m_y + h * h)
-            share = weight * q_i * q_o
-            total = total + share
-            term = share * length
-            lit = lit + term
+        From the middle of a dark arc, a_i - b_i cos(x) and a_o - b_o cos(x - between) have the product's primitive
+
+            P(x) = k_1 x - k_2 sin(x - between) - k_3 sin(x) + k_4 sin(2 x - between).
+
+        Dark arcs that are apart, or one in the other, have 2 P's odd part at x = gamma each, or the wider one alone;
+        those that overlap are one arc, from the far end of one to that of the other.
+        """
+        (i, o), between = self.shadows.at(h), self.shadows.between
+        cos, sin = self.shadows.cos_between, self.shadows.sin_between
+        radius = dr.sqrt((1 - h) * (1 + h))
+        a_i, b_i, a_o, b_o = i.outline.cos * h, i.outline.sin * radius, o.outline.cos * h, o.outline.sin * radius
+        k_1, k_2, k_3, k_4 = a_i * a_o + b_i * b_o * cos / 2, a_i * b_o, a_o * b_i, b_i * b_o / 4
+        odd_i = k_1 * i.gamma + i.sin_gamma * (cos * (2 * k_4 * i.cos_gamma - k_2) - k_3)
+        odd_o = k_1 * o.gamma + o.sin_gamma * (cos * (2 * k_4 * o.cos_gamma - k_3) - k_2)
+        even = k_4 * (_double(i.cos_gamma) + _double(o.cos_gamma)) - k_2 * i.cos_gamma - k_3 * o.cos_gamma
+        overlapping, difference = k_1 * between + sin * even, odd_i - odd_o
+        rest = dr.select(between > i.gamma + o.gamma, odd_i + odd_o, overlapping)
+        wider = dr.select(i.gamma > o.gamma, difference, -difference)
+        rest = dr.select(between < dr.abs(i.gamma - o.gamma), wider, rest)
+        return greater(2 * dr.pi * k_1 - (odd_i + odd_o + rest), 0)
+
+    def means(self, h: Any) -> tuple[Any, Any, Any]:
+        """Means over the azimuth of T / |E m'|, of the second albedo's share of it, and without T.
+
+        Weighted by (i'.m')+ (o'.m')+: errors of the rule that both have in common cancel.
+        """
+        grains, (i, o), facet = self.grains, (self.shadows.i, self.shadows.o), self.facet
+        whole, value, second, lit = TINY, 0, 0, 0
+        for x, y, width in self.nodes(h):
+            toward_i, toward_o = (greater(w.x * x + w.y * y + w.z * h, 0) for w in (i, o))
+            m = type(i)(grains.beta_x * x, grains.beta_y * y, h)
+            length = dr.rsqrt(dr.squared_norm(m))
+            seen = width * toward_i * toward_o
+            term = seen * length
+            whole, lit = whole + seen, lit + term
             if facet.coat:
-                term = term * facet.coat.through(self.stretch_i * q_i * length) * facet.coat.through(self.stretch_o * q_o * length)
+                cos_i, cos_o = self.stretch_i * toward_i * length, self.stretch_o * toward_o * length
+                term = term * facet.coat.through(cos_i) * facet.coat.through(cos_o)
             value = value + term
-            second = second + (term * facet.second(h, Vector(m_x * length, m_y * length, h * length)) if facet.second else 0)
-        scale = 1 / total
+            if facet.second:
+                second = second + term * facet.second(h, m * length)
+        scale = 1 / whole
         return value * scale, second * scale, lit * scale
 
-    def nodes(self, h: Any, i: Cut, o: Cut) -> Iterator[tuple[Any, Any, Any]]:
-        """cos, sin, weight."""
-        *_, between, _, _ = self.shadows.parts
-        radius = dr.sqrt((1 - h) * (1 + h))
+    def nodes(self, h: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """(m'_x, m'_y, weight) at the nodes of a rule on either lit arc."""
+        (i, o), between = self.shadows.at(h), self.shadows.between
         early, late = greater(i.gamma, o.gamma + between), greater(i.gamma, o.gamma - between)
-        front = (early - late) / 2, dr.pi - (early + late) / 2
-        back = (between + i.gamma - o.gamma) / 2, greater(between - i.gamma - o.gamma, 0) / 2
-        w, other = self.shadows.i, self.shadows.o
-        turn = dr.select(w.x * other.y < w.y * other.x, -1, 1)
-        inclined = self.shadows.parts[0].sin > self.shadows.parts[1].sin
-        x, y = heading(dr.select(inclined, w.x, other.x), dr.select(inclined, w.y, other.y))
-        _, _, _, _, _, _, cos, sin = self.shadows.parts
-        x, y = dr.select(inclined, x, x * cos + turn * y * sin), dr.select(inclined, y, y * cos - turn * x * sin)
-        k = None
-        if not self.isotropic:
-            R2 = (1 - h) * (1 + h)
-            k = dr.sqrt(dr.sqrt((h * h + R2 * dr.square(self.grains.beta_x)) / (h * h + R2 * dr.square(self.grains.beta_y))))
-        for (middle, half), rule, count, sign in zip((front, back), (FRONT, BACK), AROUND, (1, -1)):
+        front = (early - late) / 2, dr.pi - (early + late) / 2, 1  # middle, half width, and side
+        back = (between + i.gamma - o.gamma) / 2, greater(between - i.gamma - o.gamma, 0) / 2, -1
+        radius = dr.sqrt((1 - h) * (1 + h))
+        for (middle, half, side), few, many in zip((front, back), (FRONT, BACK), AROUND):
             sin, cos = sincos(middle)
-            mx, my = sign * (cos * x - turn * sin * y), sign * (cos * y + turn * sin * x)
-            if k is None:
-                for t, weight in rule:
-                    sin, cos = sincos(t * half) if t else (0, 1)
-                    for s in (sin, -sin) if t else (0,):
-                        yield radius * (cos * mx - s * my), radius * (cos * my + s * mx), weight * half
-                continue
-            sin, cos = sincos(half)
-            (x0, y0), (x1, y1) = (cos * mx + sin * my, cos * my - sin * mx), (cos * mx - sin * my, cos * my + sin * mx)
-            turned = [dr.atan2((1 - k) * v * u, k * u * u + v * v) for u, v in ((x0, y0), (x1, y1))]
-            step = (2 * half + turned[1] - turned[0]) * (1 / count)
-            u, v = normalised(k * x0, y0)
-            (sin, cos), (sin_2, cos_2) = sincos(step), sincos(step / 2)
-            u, v = u * cos_2 - v * sin_2, v * cos_2 + u * sin_2
-            for n in range(count):
-                scale = dr.rsqrt(u * u + k * k * v * v)
-                yield radius * u * scale, radius * k * v * scale, step * scale * scale
-                u, v = u * cos - v * sin, v * cos + u * sin
+            x, y = _rotated(*self.axis, side * cos, side * self.turn * sin)
+            for x, y, width in _few(x, y, half, few) if self.isotropic else self._many(x, y, half, h, many):
+                yield radius * x, radius * y, width
+
+    def _many(self, x: Any, y: Any, half: Any, h: Any, count: int) -> Iterator[tuple[Any, Any, Any]]:
+        """Directions about the middle (x, y) of an arc, even in an angle t in which |E m'| is less uneven.
+
+        tan(azimuth) = k tan(t), with k^2 the ratio of |E m'| along the axes of the grain.
+        """
+        flat, high = (1 - h) * (1 + h), h * h
+        along, across = (high + flat * dr.square(beta) for beta in (self.grains.beta_x, self.grains.beta_y))
+        k = dr.sqrt(dr.sqrt(along / across))
+        sin, cos = sincos(half)
+        ends = _rotated(x, y, cos, -sin), _rotated(x, y, cos, sin)
+        ahead = [dr.atan2((1 - k) * x * y, k * x * x + y * y) for x, y in ends]  # of t, of the azimuth
+        step = (2 * half + ahead[1] - ahead[0]) / count
+        (sin, cos), (sin_half, cos_half) = sincos(step), sincos(step / 2)
+        u, v = _rotated(*normalised(k * ends[0][0], ends[0][1]), cos_half, sin_half)
+        for _ in range(count):
+            scale = dr.rsqrt(u * u + k * k * v * v)
+            yield u * scale, k * v * scale, step * scale * scale  # but for the factor k
+            u, v = _rotated(u, v, cos, sin)
+
+
+def _few(x: Any, y: Any, half: Any, rule: Iterable[tuple[float, float]]) -> Iterator[tuple[Any, Any, Any]]:
+    """Directions about the middle (x, y) of an arc, at the nodes of a rule."""
+    for t, weight in rule:
+        sin, cos = sincos(t * half)
+        yield *_rotated(x, y, cos, sin), weight * half
+        if t:
+            yield *_rotated(x, y, cos, -sin), weight * half
+
+
+def _rotated(x: Any, y: Any, cos: Any, sin: Any) -> tuple[Any, Any]:
+    """(x, y) turned counterclockwise."""
+    return x * cos - y * sin, y * cos + x * sin
+
+
+def _double(cos: Any) -> Any:
+    """Cosine of twice the angle."""
+    return 2 * cos * cos - 1
 
 
 @dataclass
