@@ -27,18 +27,22 @@ from .material import Facet, Material
 from .shadows import Shadows
 
 HEIGHTS: Rule = (
-    (0.9999997, 0.99984726, 0.99915907, 0.99757463, 0.99459839, 0.98910712, 0.97815752, 0.95715387)
-    + (0.91996308, 0.85700717, 0.76286468, 0.62777942, 0.45821171, 0.27114857, 0.11861464, 0.023937673),
-    (1.848649e-06, 0.0003957211, 0.0010347386, 0.0022168388, 0.0039061404, 0.0075616562, 0.015159354, 0.027675225)
-    + (0.048518598, 0.078293067, 0.11209211, 0.1562851, 0.18174437, 0.18118071, 0.12300935, 0.060674567),
+    (0.99999507, 0.99985764, 0.9992813, 0.99799518, 0.99579025, 0.99175819, 0.98395383, 0.96882886)
+    + (0.93825677, 0.88079583, 0.78563192, 0.63849252, 0.46241259, 0.28173457, 0.12884615, 0.030159063),
+    (1.9901226e-05, 0.00032090145, 0.00086514632, 0.0017430864, 0.0027881084, 0.0056446717, 0.010480591, 0.021190192)
+    + (0.041823697, 0.074926728, 0.11906232, 0.16861566, 0.18325799, 0.17030383, 0.13174946, 0.066998966),
 )
-"""Nodes and weights in h, crowded at the top, which alone is seen at grazing: fitted (`fit`)."""
+"""Nodes and weights in h, crowded at the top, which alone is seen at grazing.
+
+Fitted, for value and density of 26 000 random inputs of the whole range: least squares from Gauss-Legendre nodes in
+(1 - h)^(1/3) on, then the norms of exponents 4, 8, 12 of the relative error."""
 RULES.add(HEIGHTS)
 FRONT = (0, 1), (0.514716, 0.923746), (0.911243, 0.485973)
 BACK = (0, 1.4346), (0.713981, 1.102812)
-"""(node, weight) pairs on half a lit arc, the front one and the back one, which is mostly empty; fitted."""
+"""Pairs of node and weight on half a lit arc, the front one and the back one, which is mostly empty, of round grains:
+fitted likewise to coats of index 1.01 to 2.5 and to colours by normal."""
 AROUND = 16, 8
-"""Midpoints on either arc, of grains that are not round."""
+"""Even nodes on either arc, of other grains, and of coats that may reflect totally."""
 
 
 class Integral(NamedTuple):
@@ -178,7 +182,9 @@ class Rings:
         for (middle, half, side), few, many in zip((front, back), (FRONT, BACK), AROUND):
             sin, cos = sincos(middle)
             x, y = _rotated(*self.axis, side * cos, side * self.turn * sin)
-            for x, y, width in _few(x, y, half, few) if self.isotropic else self._many(x, y, half, h, many):
+            for x, y, width in (
+                _few(x, y, half, few) if self.isotropic and self.facet.smooth else self._many(x, y, half, h, many)
+            ):
                 yield radius * x, radius * y, width
 
     def _many(self, x: Any, y: Any, half: Any, h: Any, count: int) -> Iterator[tuple[Any, Any, Any]]:

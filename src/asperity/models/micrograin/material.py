@@ -25,6 +25,11 @@ class Facet:
         """Whether facets at one height are the same."""
         return self.coat is None and (self.second is None or self.second.by_height)
 
+    @property
+    def smooth(self) -> bool:
+        """Whether few nodes do: a coat of index below 1 has a critical angle."""
+        return self.coat is None or self.coat.fitted is not None
+
 
 @dataclass
 class Material:
