@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Rule = tuple[tuple[float, ...], tuple[float, ...]]
 """Nodes and weights on [0, 1]."""
 RULES: set[int | Rule] = {4, 5, 6, 8, 12, 16}
-"""Rules that models use in recorded loops, by number of nodes or whole: add yours, or `dr.freeze` does not find them."""
+"""Rules that models use in recorded loops, by number of nodes or whole: add yours, or `dr.freeze` misses them."""
 
 
 @cache
@@ -32,7 +32,7 @@ def gauss_legendre(n: int) -> tuple[list[float], list[float]]:
 
 @cache
 def rule(n: int | Rule, number: Any) -> tuple[Any, Any]:
-    """The nodes and weights of ``n`` Gauss nodes, or of the rule itself, as arrays of the type ``number``, made once."""
+    """Nodes and weights, of ``n`` Gauss nodes or of another rule, as arrays of the type ``number``, made once."""
     nodes, weights = gauss_legendre(n) if isinstance(n, int) else n
     return number(nodes), number(weights)
 
@@ -67,9 +67,9 @@ def _with_own_derivatives(tree: Any) -> Any:
 
 
 def integrate(f: Callable[[Any, Any], tuple], n: int | Rule, captured: Any, like: Any, nested: bool = False) -> tuple:
-    """Integrals over [0, 1] of the functions that ``f(node, captured)`` returns as a tuple, by ``n`` Gauss nodes.
+    """Integrals over [0, 1] of the functions that ``f(node, captured)`` returns as a tuple.
 
-    Or by another rule.
+    By ``n`` Gauss nodes, or by another rule.
 
     ``like`` is a number of the type that ``f`` takes; ``captured`` is that of `accumulate`. A recorded loop runs as
     fast as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives

@@ -12,7 +12,6 @@ from asperity.models.micrograin.diffuse import Facet, lambertian
 from asperity.models.micrograin.grains import Grains, SecondColour
 from asperity.models.micrograin.shadows import Shadows, shadow
 
-
 HEIGHTS, AZIMUTHS = 96, 1024
 
 

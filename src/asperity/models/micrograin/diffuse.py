@@ -27,10 +27,42 @@ from .material import Facet, Material
 from .shadows import Shadows
 
 HEIGHTS: Rule = (
-    (0.99999507, 0.99985764, 0.9992813, 0.99799518, 0.99579025, 0.99175819, 0.98395383, 0.96882886)
-    + (0.93825677, 0.88079583, 0.78563192, 0.63849252, 0.46241259, 0.28173457, 0.12884615, 0.030159063),
-    (1.9901226e-05, 0.00032090145, 0.00086514632, 0.0017430864, 0.0027881084, 0.0056446717, 0.010480591, 0.021190192)
-    + (0.041823697, 0.074926728, 0.11906232, 0.16861566, 0.18325799, 0.17030383, 0.13174946, 0.066998966),
+    (
+        0.99999507,
+        0.99985764,
+        0.9992813,
+        0.99799518,
+        0.99579025,
+        0.99175819,
+        0.98395383,
+        0.96882886,
+        0.93825677,
+        0.88079583,
+        0.78563192,
+        0.63849252,
+        0.46241259,
+        0.28173457,
+        0.12884615,
+        0.030159063,
+    ),
+    (
+        1.9901226e-05,
+        0.00032090145,
+        0.00086514632,
+        0.0017430864,
+        0.0027881084,
+        0.0056446717,
+        0.010480591,
+        0.021190192,
+        0.041823697,
+        0.074926728,
+        0.11906232,
+        0.16861566,
+        0.18325799,
+        0.17030383,
+        0.13174946,
+        0.066998966,
+    ),
 )
 """Nodes and weights in h, crowded at the top, which alone is seen at grazing.
 
@@ -41,7 +73,7 @@ FRONT = (0, 1), (0.514716, 0.923746), (0.911243, 0.485973)
 BACK = (0, 1.4346), (0.713981, 1.102812)
 """Pairs of node and weight on half a lit arc, the front one and the back one, which is mostly empty, of round grains:
 fitted likewise to coats of index 1.01 to 2.5 and to colours by normal."""
-AROUND = 16, 8
+AROUND = 20, 10
 """Even nodes on either arc, of other grains, and of coats that may reflect totally."""
 
 
@@ -90,8 +122,8 @@ def lambertian(
 class Rings:
     """The rings of a grain: integrals over the azimuth x of (i'.m')+ (o'.m')+ T / |E m'| at any height.
 
-    With R^2 = 1 - h^2, and x counted from i towards o, i'.m' = i_z h + sin_i R cos(x) is positive for |x| < pi - gamma_i,
-    and o'.m' = o_z h + sin_o R cos(x - between) likewise. So what is dark of the ring are two arcs of half widths gamma
+    With R^2 = 1 - h^2, and x from i towards o, i'.m' = i_z h + sin_i R cos(x) is positive for |x| < pi - gamma_i, and
+    o'.m' = o_z h + sin_o R cos(x - between) likewise. So what is dark of the ring are two arcs of half widths gamma
     about pi and pi + between; what is lit is one arc, or two if light comes from behind and they are apart.
     """
 
@@ -174,17 +206,17 @@ class Rings:
 
     def nodes(self, h: Any) -> Iterator[tuple[Any, Any, Any]]:
         """(m'_x, m'_y, weight) at the nodes of a rule on either lit arc."""
-        (i, o), between = self.shadows.at(h), self.shadows.between
+        (i, o), between, axis = self.shadows.at(h), self.shadows.between, self.axis
+        assert axis is not None
+        alike = self.isotropic and self.facet.smooth
         early, late = greater(i.gamma, o.gamma + between), greater(i.gamma, o.gamma - between)
         front = (early - late) / 2, dr.pi - (early + late) / 2, 1  # middle, half width, and side
         back = (between + i.gamma - o.gamma) / 2, greater(between - i.gamma - o.gamma, 0) / 2, -1
         radius = dr.sqrt((1 - h) * (1 + h))
         for (middle, half, side), few, many in zip((front, back), (FRONT, BACK), AROUND):
             sin, cos = sincos(middle)
-            x, y = _rotated(*self.axis, side * cos, side * self.turn * sin)
-            for x, y, width in (
-                _few(x, y, half, few) if self.isotropic and self.facet.smooth else self._many(x, y, half, h, many)
-            ):
+            x, y = _rotated(*axis, side * cos, side * self.turn * sin)
+            for x, y, width in _few(x, y, half, few) if alike else self._many(x, y, half, h, many):  # noqa: B020
                 yield radius * x, radius * y, width
 
     def _many(self, x: Any, y: Any, half: Any, h: Any, count: int) -> Iterator[tuple[Any, Any, Any]]:
