@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from ...microfacet.fast import greater, polynomial
@@ -45,10 +44,11 @@ LEAST = 1e-12
 """Least g^2, with a derivative of its root that is a number."""
 
 
-def fit(eta: float) -> tuple[Any, ...] | None:
-    """T / cos by powers of 2 cos - 1: half the cost of the exact form. None for an index that is not in `FITTED`."""
-    if not FITTED[0] <= eta <= FITTED[1]:
-        return None
+def fit(eta: Any) -> tuple[Any, ...]:
+    """T / cos by powers of 2 cos - 1: half the cost of the exact form, for an index in `FITTED`."""
     cosines = (np.polynomial.chebyshev.chebpts1(3 * DEGREE) + 1) / 2
-    slopes = [transmittance(float(cos), eta) / cos for cos in cosines]
-    return tuple(dr.opaque(mi.Float, x) for x in np.polynomial.polynomial.polyfit(2 * cosines - 1, slopes, DEGREE))
+    slopes = [transmittance(float(cos), eta) / float(cos) for cos in cosines]
+    least_squares = np.linalg.pinv(np.vander(2 * cosines - 1, DEGREE + 1, increasing=True)).tolist()
+    found = tuple(sum(weight * slope for weight, slope in zip(row, slopes)) for row in least_squares)
+    dr.make_opaque(found)
+    return found

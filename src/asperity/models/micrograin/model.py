@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -13,7 +14,7 @@ from ...lobes import Lifted, Lobe, LobeModel, Opening, diffuse, glossy
 from ...microfacet.albedo import upright_albedo
 from ...microfacet.tables import Made
 from ...parameters import BSDF, Axes, Choice, Colour, Flag, Ior, Texture, Usual, conflict, constant, varies
-from .coat import Coat, fit
+from .coat import FITTED, Coat, fit
 from .compensation import LossTable, Returned
 from .diffuse import Lambertian
 from .grains import Grains, SecondColour
@@ -103,7 +104,7 @@ class Micrograin(LobeModel):
             self._check_second_colour()
         if self.masking == "smith" and (self.scattering != "single" or self.variation != "none"):
             raise ParameterError('masking = "smith": its grains scatter once and have no height; leave out the rest.')
-        self.losses = Made()
+        self.losses, self.fittable = Made(), False
 
     def _check_second_colour(self) -> None:
         metal = self.grains == "metal"
@@ -126,7 +127,11 @@ class Micrograin(LobeModel):
         if self.grains != "coated" or varies(self.int_ior) or varies(self.ext_ior):
             return None
         eta = constant("int_ior", self.int_ior) / constant("ext_ior", self.ext_ior)
-        return None if dr.grad_enabled(eta) else fit(float(dr.slice(eta)))
+        if dr.grad_enabled(eta):
+            return None
+        with suppress(RuntimeError):  # updated in a function under dr.freeze, which knows no numbers: as it was before
+            self.fittable = FITTED[0] <= float(dr.slice(eta)) <= FITTED[1]
+        return fit(eta) if self.fittable else None
 
     def flags(self) -> list[int]:
         """A glossy lobe but for diffuse grains, a diffuse one but for metal, and that of ``multiple``."""
