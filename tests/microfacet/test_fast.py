@@ -44,6 +44,22 @@ def test_angles():
     np.testing.assert_allclose(beside, alone, rtol=1e-6)
 
 
+def test_angle():
+    x = np.concatenate([np.linspace(0, np.pi, N), np.geomspace(1e-10, 1, N)])
+    cos, sin = np.cos(x).astype(np.float32), np.maximum(np.sin(x), 0).astype(np.float32)
+    exact = np.arctan2(sin.astype(float), cos.astype(float))
+    found = fast.angle(llvm.Float(cos), llvm.Float(sin)).numpy()
+    acute = fast.acute_angle(llvm.Float(cos), llvm.Float(sin)).numpy()
+    assert np.abs(found / np.maximum(exact, 1e-30) - 1)[exact > 0].max() < 4e-7
+    np.testing.assert_array_equal(acute[cos >= 0], found[cos >= 0])
+    _, slope = fast_slope(np.linspace(1e-3, np.pi - 1e-3, N, dtype=np.float32))
+    assert np.abs(slope - 1).max() < 5e-5
+
+
+def fast_slope(x):
+    return found(lambda x: fast.angle(dr.cos(x), dr.sin(x)), x)
+
+
 def _once_and_beside(cos, sin):
     return [(cos, sin)], [(llvm.Float(0.6), llvm.Float(0.8)), (cos, sin)]
 

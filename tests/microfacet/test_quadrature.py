@@ -75,7 +75,7 @@ def test_accumulate_sums_from_its_start(forward):
         np.testing.assert_allclose(dr.grad(start), [1, 1])
 
 
-@pytest.mark.parametrize("n", RULES)
+@pytest.mark.parametrize("n", [n for n in RULES if isinstance(n, int)])
 def test_rules_are_gausss(n):
     """Exact up to degree 2 n - 1."""
     x, w = map(np.array, gauss_legendre(n))

@@ -31,6 +31,18 @@ CASES = {  # description and parameters
         ["beta.value", "diffuse_reflectance_2.value"],
     ),
     "coated": ({"type": "micrograin", "int_ior": 1.5}, ["tau_0.value", "beta.value", "int_ior.value"]),
+    "coated, stretched": (
+        {"type": "micrograin", "int_ior": 1.5, "beta_x": 0.4, "beta_y": 1.0},
+        ["tau_0.value", "beta_x.value", "int_ior.value"],
+    ),
+    "diffuse, stretched": (
+        {"type": "micrograin", "specular": False, "beta_x": 0.4, "beta_y": 1.0},
+        ["tau_0.value", "beta_x.value", "diffuse_reflectance.value"],
+    ),
+    "by normal": (
+        {"type": "micrograin", "specular": False, "variation": "normal", "diffuse_reflectance_2": 0.9},
+        ["beta.value", "variation_azimuth.value", "diffuse_reflectance_2.value"],
+    ),
     "smith": ({"type": "micrograin", "masking": "smith", "base": {"type": "diffuse"}}, ["tau_0.value", "beta.value"]),
     "multiple": (
         {"type": "micrograin", "scattering": "multiple", "tau_0": 0.4, "base": ROUGH},

@@ -28,6 +28,20 @@ TWICE_ARC_TANGENT = (
 fits it anew)."""
 
 
+ARC_COSINE = (
+    1.5707962162,
+    -0.9999815164,
+    0.7848809746,
+    -0.6609692088,
+    0.5565558543,
+    -0.423582284,
+    0.2520860876,
+    -0.0972649228,
+    0.0174788696,
+)
+"""arccos(c) / sqrt(1 - c^2) by powers of c, for c in [0, 1]; fitted likewise."""
+
+
 def polynomial(x: Any, coefficients: Sequence[Any]) -> Any:
     """Sum of ``coefficients[n] * x**n``."""
     total = coefficients[-1]
@@ -81,6 +95,17 @@ def angles(*points: tuple[Any, Any]) -> list:
     halves = [sin * inverse for (_, sin), inverse in zip(points, reciprocals(*(1 + dr.abs(cos) for cos, _ in points)))]
     acute = [tan * polynomial(tan * tan, TWICE_ARC_TANGENT) for tan in halves]
     return [dr.select(cos < 0, dr.pi - angle, angle) for (cos, _), angle in zip(points, acute)]
+
+
+def acute_angle(cos: Any, sin: Any) -> Any:
+    """Angle in [0, pi / 2] of a unit vector, to 3e-7 of itself; without a division."""
+    return sin * polynomial(cos, ARC_COSINE)
+
+
+def angle(cos: Any, sin: Any) -> Any:
+    """Angle in [0, pi] of a unit vector, sin >= 0, to 3e-7 of itself; without a division."""
+    acute = acute_angle(dr.abs(cos), sin)
+    return dr.select(cos < 0, dr.pi - acute, acute)
 
 
 def exp_of_negative(x: Any) -> Any:

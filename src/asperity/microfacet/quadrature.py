@@ -18,8 +18,10 @@ from .tables import Table
 if TYPE_CHECKING:
     from .distributions import Distribution
 
-RULES = (4, 5, 6, 8, 12, 16)
-"""Numbers of nodes that models use in recorded loops: add yours, or `dr.freeze` does not find them."""
+Rule = tuple[tuple[float, ...], tuple[float, ...]]
+"""Nodes and weights on [0, 1]."""
+RULES: set[int | Rule] = {4, 5, 6, 8, 12, 16}
+"""Rules that models use in recorded loops, by number of nodes or whole: add yours, or `dr.freeze` misses them."""
 
 
 TURN = 1e-5
@@ -34,9 +36,9 @@ def gauss_legendre(n: int) -> tuple[list[float], list[float]]:
 
 
 @cache
-def rule(n: int, number: Any) -> tuple[Any, Any]:
-    """The nodes and weights as arrays of the type ``number``, made once."""
-    nodes, weights = gauss_legendre(n)
+def rule(n: int | Rule, number: Any) -> tuple[Any, Any]:
+    """Nodes and weights, of ``n`` Gauss nodes or of another rule, as arrays of the type ``number``, made once."""
+    nodes, weights = gauss_legendre(n) if isinstance(n, int) else n
     return number(nodes), number(weights)
 
 
@@ -69,27 +71,30 @@ def _with_own_derivatives(tree: Any) -> Any:
     return tree + 0 if dr.is_array_v(tree) and dr.grad_enabled(tree) else tree
 
 
-def integrate(f: Callable[[Any, Any], tuple], n: int, captured: Any, like: Any, nested: bool = False) -> tuple:
-    """Integrals over [0, 1] of the functions that ``f(node, captured)`` returns as a tuple, by ``n`` Gauss nodes.
+def integrate(f: Callable[[Any, Any], tuple], n: int | Rule, captured: Any, like: Any, nested: bool = False) -> tuple:
+    """Integrals over [0, 1] of the functions that ``f(node, captured)`` returns as a tuple.
+
+    By ``n`` Gauss nodes, or by another rule.
 
     ``like`` is a number of the type that ``f`` takes; ``captured`` is that of `accumulate`. A recorded loop runs as
     fast as ``n`` copies of ``f``, and compiles ten times faster; but where it is ``nested`` in another one, derivatives
     need the copies.
     """
     Float: Any = type(like)
-    nodes, weights = gauss_legendre(n)
+    nodes, weights = gauss_legendre(n) if isinstance(n, int) else n
     if not dr.is_jit_v(like) or (nested and dr.grad_enabled(f(Float(nodes[0]), captured))):
         copies = (f(node, captured) for node in nodes)
         terms = [[weight * value for value in values] for values, weight in zip(copies, weights)]
         return tuple(map(sum, zip(*terms)))
     start = tuple(dr.zeros(type(value)) for value in f(Float(nodes[0]), captured))
-    nodes, weights = rule(n, Float)
+    nodes, weights = rule(n, Float)  # type: ignore[assignment]
+    size = dr.width(nodes)
 
     def term(index: Any, captured: Any) -> tuple:
         weight = dr.gather(Float, weights, index)
         return tuple(weight * value for value in f(dr.gather(Float, nodes, index), captured))
 
-    return accumulate(term, dr.uint32_array_t(Float)(n), start, captured)
+    return accumulate(term, dr.uint32_array_t(Float)(size), start, captured)
 
 
 @dataclass

@@ -10,7 +10,7 @@ from helpers import directions, unit
 from hypothesis import given
 from hypothesis import strategies as st
 
-from asperity.models.micrograin.shadows import Shadows, shadow, silhouette
+from asperity.models.micrograin.shadows import Shadows, shadow
 
 
 def families(rng, n):
@@ -59,16 +59,16 @@ def test_outlines_cross_on_both_cylinders():
     rng = np.random.default_rng(4)
     i, o = directions(rng, 4000, 0.05), directions(rng, 4000, 0.05)
     h = rng.uniform(0, 1, 4000)
-    arrays = llvm.Array3f64(i), llvm.Array3f64(o)
+    shadows = Shadows(llvm.Array3f64(i), llvm.Array3f64(o))
     points, inside = [], np.ones(4000, bool)
-    for (w, other), outline in zip(((i, o), (o, i)), Shadows(*arrays).outlines):
-        cos_alpha, sin_alpha, _ = silhouette(outline.sin, outline.cos, llvm.Float64(h))
-        cos_psi, sin_psi = (np.array(x) for x in outline.crossing(llvm.Float64(h), cos_alpha, sin_alpha))
+    cos_sum = dr.minimum(shadows.level * llvm.Float64(h), 1)
+    for (w, other), cut in zip(((i, o), (o, i)), shadows.at(llvm.Float64(h))):
+        cos_psi, sin_psi = (np.array(x) for x in cut.crossing(cos_sum, dr.safe_sqrt(1 - cos_sum**2)))
         along, across = unit(w[:2]), unit(np.stack([-w[1], w[0]]))
         across = -across * np.sign((across * other[:2]).sum(0))  # the other shadow lies opposite to its direction
         s = np.hypot(*w[:2])
         p = np.concatenate([(h * s - cos_psi) / w[2] * along + sin_psi * across, [h]])
-        inside &= np.abs(sin_psi) < 0.999 * np.array(sin_alpha)
+        inside &= np.abs(sin_psi) < 0.999 * np.array(cut.sin_alpha)
         points.append(p)
     p, q = (point[:, inside] for point in points)
     i, o = i[:, inside], o[:, inside]
@@ -111,6 +111,7 @@ def test_float32_masking_and_its_gradients(family, height):
 
 
 def test_identities_of_the_masking_function():
+    """Angles are polynomials, good to 7e-8 of themselves; areas are angles over cosines of 0.05 or more."""
     rng = np.random.default_rng(1)
     i, o = (llvm.Array3f64(directions(rng, 1000, 0.05)) for _ in range(2))
     h, n = llvm.Float64(rng.uniform(0, 1, 1000)), llvm.Array3f64(0, 0, 1)
@@ -119,6 +120,6 @@ def test_identities_of_the_masking_function():
     assert dr.allclose(Shadows(i, i).union(h), one, atol=1e-6)  # retro-reflection: the shadows coincide
     assert dr.allclose(Shadows(i, n).union(h), one, atol=1e-6)  # along n there is none
     assert dr.allclose(both.union(llvm.Float64(1)), 0, atol=1e-9)  # nor is there at the top
-    assert dr.all(both.union(h) <= both.sum(h) + 1e-9)  # Eq. 18 is at least Eq. 17
+    assert dr.all(both.union(h) <= both.sum(h) + 1e-5)  # Eq. 18 is at least Eq. 17
     across = llvm.Array3f64(-i.x, -i.y, i.z)
     assert dr.allclose(Shadows(i, across).union(h), Shadows(i, across).sum(h), atol=1e-6)  # disjoint

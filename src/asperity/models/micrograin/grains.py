@@ -35,6 +35,10 @@ class Grains:
         """A direction in sphere space."""
         return to_sphere(w, self.beta_x, self.beta_y)
 
+    def stretch(self, w: Any) -> Any:
+        """|E w|."""
+        return dr.sqrt(dr.square(self.beta_x * w.x) + dr.square(self.beta_y * w.y) + dr.square(w.z))
+
     def lift(self, w: Any) -> Any:
         """A direction kept off the horizon; those from below are meaningless then, and masked by the caller."""
         return lift(w, self.beta_x, self.beta_y)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +9,7 @@ import drjit as dr
 
 from ...microfacet.numerics import TINY
 from ...microfacet.quadrature import gauss_legendre
+from .coat import Coat
 from .grains import SecondColour
 
 
@@ -18,12 +18,17 @@ class Facet:
     """What a grain's facets are, beside Lambertian of albedo 1: dataclasses, since they pass through recorded loops."""
 
     second: SecondColour | None = None  # where there is a second albedo
-    coat: Callable[[Any], Any] | None = None  # reflectance of a dielectric coat, of the local cosine
+    coat: Coat | None = None
 
     @property
     def alike_around(self) -> bool:
         """Whether facets at one height are the same."""
         return self.coat is None and (self.second is None or self.second.by_height)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether few nodes do: a coat of index below 1 has a critical angle."""
+        return self.coat is None or self.coat.fitted is not None
 
 
 @dataclass

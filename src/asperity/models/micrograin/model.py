@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -11,9 +12,9 @@ from ...conductors import Conductor
 from ...errors import ParameterError
 from ...lobes import Lifted, Lobe, LobeModel, Opening, diffuse, glossy
 from ...microfacet.albedo import upright_albedo
-from ...microfacet.fresnel import Dielectric
 from ...microfacet.tables import Made
-from ...parameters import BSDF, Axes, Choice, Colour, Flag, Ior, Texture, Usual, conflict, constant
+from ...parameters import BSDF, Axes, Choice, Colour, Flag, Ior, Texture, Usual, conflict, constant, varies
+from .coat import FITTED, Coat, fit
 from .compensation import LossTable, Returned
 from .diffuse import Lambertian
 from .grains import Grains, SecondColour
@@ -103,7 +104,7 @@ class Micrograin(LobeModel):
             self._check_second_colour()
         if self.masking == "smith" and (self.scattering != "single" or self.variation != "none"):
             raise ParameterError('masking = "smith": its grains scatter once and have no height; leave out the rest.')
-        self.losses = Made()
+        self.losses, self.fittable = Made(), False
 
     def _check_second_colour(self) -> None:
         metal = self.grains == "metal"
@@ -114,11 +115,23 @@ class Micrograin(LobeModel):
             raise ParameterError(f'variation = {self.variation!r}: needs two metals; material "none" has no index.')
 
     def update(self) -> None:
-        """Bring the table of losses up to date, which is made from beta."""
+        """Bring up to date what is made from parameters: the coat's fit, and the table of losses, from beta."""
+        self.coat = self._constant_coat()
         if self.scattering == "multiple":
             make = partial(LossTable.made, self.grains != "metal", SHADED[self.masking])
             why = ': scattering = "multiple" makes a table from it; tau_0 may be a texture'
             self.losses.update(make, *(constant(name, texture, why) for name, texture in self.beta.textures.items()))
+
+    def _constant_coat(self) -> Any:
+        """The fit of the coat's transmittance if its index is the same everywhere and has no derivatives, else None."""
+        if self.grains != "coated" or varies(self.int_ior) or varies(self.ext_ior):
+            return None
+        eta = constant("int_ior", self.int_ior) / constant("ext_ior", self.ext_ior)
+        if dr.grad_enabled(eta):
+            return None
+        with suppress(RuntimeError):  # updated in a function under dr.freeze, which knows no numbers: as it was before
+            self.fittable = FITTED[0] <= float(dr.slice(eta)) <= FITTED[1]
+        return fit(eta) if self.fittable else None
 
     def flags(self) -> list[int]:
         """A glossy lobe but for diffuse grains, a diffuse one but for metal, and that of ``multiple``."""
@@ -159,7 +172,7 @@ class Micrograin(LobeModel):
         if self.variation == "normal":
             sin, cos = dr.sincos(dr.deg2rad(at("variation_azimuth")))
             second = SecondColour(cos, sin)
-        coat = Dielectric(at("int_ior") / at("ext_ior")) if self.grains == "coated" else None
+        coat = Coat(at("int_ior") / at("ext_ior"), self.coat) if self.grains == "coated" else None
         return Material(
             at("metal"), at("metal_2"), coat, at("diffuse_reflectance"), at("diffuse_reflectance_2"), second
         )
