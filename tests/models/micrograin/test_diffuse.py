@@ -71,7 +71,7 @@ FITTED = FACETS | {f"fitted {eta}": Facet(SecondColour(), Coat(eta, "fit")) for 
 @pytest.mark.parametrize("isotropic", [True, False], ids=["isotropic", "anisotropic"])
 @pytest.mark.parametrize("facet", FITTED)
 def test_quadrature(rgb, facet, isotropic):
-    """Cosines from 1e-3, betas of 0.1 to 5: half a percent for 99.5 % of inputs, 1 % at worst, where values exceed 1e-3.
+    """Cosines from 1e-3, betas of 0.1 to 5: half a percent for 99.5 %, 1 % at worst, where above 1e-3.
 
     Of more inputs, and of axes as 1 to 20 or more, a few in 10^4 are beyond 1 % (docs/micrograin.md).
     """
