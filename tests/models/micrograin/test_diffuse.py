@@ -65,15 +65,15 @@ FACETS = {
     "by normal": Facet(SecondColour(0.8, 0.6)),
     "coated": Facet(SecondColour(), Coat(1.5)),
 }
-FITTED = FACETS | {f"fitted {eta}": Facet(SecondColour(), Coat(eta, "fit")) for eta in (1.1, 2.5)}
+FITTED = FACETS | {f"fitted {eta}": Facet(SecondColour(), Coat(eta, "fit")) for eta in (1.2, 2.5)}
 
 
 @pytest.mark.parametrize("isotropic", [True, False], ids=["isotropic", "anisotropic"])
 @pytest.mark.parametrize("facet", FITTED)
 def test_quadrature(rgb, facet, isotropic):
-    """The whole range: half a percent for 99.5 % of inputs, 1 % at worst, where values exceed 1e-3.
+    """Cosines from 1e-3, betas of 0.1 to 5: half a percent for 99.5 %, 1 % at worst, where above 1e-3.
 
-    Measured: 0.4 and 0.6 %. Beyond are one grain in 10^4, and axes as 1 to 20 or more (docs/micrograin.md).
+    Of more inputs, and of axes as 1 to 20 or more, a few in 10^4 are beyond 1 % (docs/micrograin.md).
     """
     facet, n = FITTED[facet], 200
     if facet.coat and facet.coat.fitted:
@@ -82,7 +82,7 @@ def test_quadrature(rgb, facet, isotropic):
     i, o = directions(rng, n, 1e-3), directions(rng, n, 1e-3)
     o[:, : n // 4] = unit(i + 0.05 * rng.normal(size=i.shape))[:, : n // 4]
     o[2] = np.maximum(np.abs(o[2]), 1e-3)
-    o, beta = unit(o), np.exp(rng.uniform(np.log(0.1), np.log(2), (2, n)))
+    o, beta = unit(o), np.exp(rng.uniform(np.log(0.1), np.log(5), (2, n)))
     i[:, -4:], o[:, -4:-2] = np.array([[0], [0], [1]]), np.array([[0], [0], [1]])
     tau_0, betas = rng.uniform(0.01, 1, n), beta[[0, 0]] if isotropic else beta
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...microfacet.fast import greater, polynomial
 from ...microfacet.fresnel import Dielectric
 
-FITTED = 1.1, 2.5
+FITTED = 1.2, 2.5
 """Relative indices between which `fit` is good to .25 % of T, or .01 of that where T is small."""
 DEGREE = 7
 
