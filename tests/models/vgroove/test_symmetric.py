@@ -10,8 +10,8 @@ from asperity.microfacet.distributions import GGX, Beckmann, Phong
 from asperity.microfacet.fresnel import Metal
 from asperity.models.vgroove.fresnel import Reflectance, fit
 from asperity.models.vgroove.kaleidoscope import Pair
-from asperity.models.vgroove.symmetric import POLE, WRITTEN, cook_torrance_share, numbered, symmetric
-from asperity.models.vgroove.terms import by_terms
+from asperity.models.vgroove.symmetric import POLE, WRITTEN, cook_torrance_share, symmetric
+from asperity.models.vgroove.terms import by_terms, numbered
 from asperity.models.vgroove.tilts import TILTS
 
 KINDS = ((True, 1), (True, -1), (False, 1), (False, -1))

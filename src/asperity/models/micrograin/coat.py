@@ -15,6 +15,8 @@ from ...microfacet.fresnel import Dielectric
 FITTED = 1.2, 2.5
 """Relative indices between which `fit` is good to .25 % of T, or .01 of that where T is small."""
 DEGREE = 7
+LEAST = 1e-12
+"""Least g^2, with a derivative of its root that is a number."""
 
 
 @dataclass
@@ -38,10 +40,6 @@ def transmittance(cos: Any, eta: Any) -> Any:
     g = dr.sqrt(greater(cos * cos + (eta_2 - 1), LEAST))
     a, b = cos + g, eta_2 * cos + g
     return 2 * cos * g * (b * b + eta_2 * (a * a)) * dr.square(dr.rcp(a * b))
-
-
-LEAST = 1e-12
-"""Least g^2, with a derivative of its root that is a number."""
 
 
 def fit(eta: Any) -> tuple[Any, ...]:

@@ -30,7 +30,8 @@ from ...microfacet.numerics import clamp
 from ...microfacet.quadrature import accumulate, integrate
 from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
 from .kaleidoscope import Pair
-from .symmetric import POLE, numbered
+from .symmetric import POLE
+from .terms import numbered
 from .tilts import Tilts
 
 NODES = {GGX: (4, 5), Beckmann: (4, 8), Phong: (4, 8)}

@@ -21,9 +21,7 @@ where light comes from one side only in the second integral, a small one. `Rest`
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import accumulate as running_sums
 from typing import Any
 
 import drjit as dr
@@ -73,40 +71,6 @@ def cook_torrance_share(pair: Pair) -> Any:
     """g of a single bounce: what the steeper of the directions, which the cavity hides more, sees of the facet h."""
     beyond = pair.cos_theta * pair.cos_delta - pair.sin_theta * pair.sin_delta  # its cosine; all are divided by l
     return cavity_visible(pair.cos_delta, beyond, pair.cos_theta)
-
-
-def bounce_limits(pair: Pair) -> list:
-    """Numbers that k stays below, for each kind of terms that `numbered` tells apart."""
-    theta, delta, both = pair.theta, pair.delta, pair.theta + pair.delta
-    half = dr.pi / 2
-    ranges = (half - theta, delta), (half + theta, both), (half - delta, theta), (half + delta, both)
-    return [above / dr.maximum(below, 1e-6) for above, below in ranges]
-
-
-def numbered(limits: Any, most: Any, first_even: int = 2) -> tuple[Any, Callable]:
-    """(n, f): how many terms of several bounces there are, and f(0..n-1) = (k, odd, tau) of each.
-
-    They are of four kinds: odd k with tau = 1, odd k with -1, even k with 1, even k with -1. Odd k begin at 3, even k
-    at ``first_even``; they end at ``most``, and below the kind's limit. Kind after kind, they are numbered without
-    gaps: in a loop over them no lane waits for others to find out that a term is empty.
-    """
-    Float, UInt, first_odd = type(limits[0]), type(most), 3
-
-    def terms(limit: Any, first: int) -> Any:  # how many of first, first + 2, ... are below it
-        beyond = UInt(dr.ceil(dr.minimum(dr.detach(limit), Float(most) + 1)))
-        return dr.select(beyond > first, (beyond + 1 - first) // 2, 0)
-
-    counts = map(terms, limits, (first_odd, first_odd, first_even, first_even))
-    ends = list(running_sums(counts))  # of the kinds' numbers
-
-    def term(index: Any) -> tuple[Any, Any, Any]:
-        odd = index < ends[1]
-        minus = dr.select(odd, index >= ends[0], index >= ends[2])
-        begin = dr.select(odd, dr.select(minus, ends[0], 0), dr.select(minus, ends[2], ends[1]))
-        k = 2 * (index - begin) + dr.select(odd, UInt(first_odd), UInt(first_even))
-        return k, odd, dr.select(minus, Float(-1), Float(1))
-
-    return ends[3], term
 
 
 @dataclass
@@ -223,9 +187,8 @@ class Rest:
         a, bend = first - 1, 3.5 / first
         b = turn * (1 / a)
         above = greater(b - least, 1e-5)
-        p = lesser(
-            (0.92 + steepness) * above + b, 3 * a / (1 - bend / 2) * above
-        )  # times that; by half a bounce at most
+        p = (0.92 + steepness) * above + b  # times b - Q
+        p = lesser(p, 3 * a / (1 - bend / 2) * above)  # so that it begins half a bounce later at most
         below = 6 * a * above + bend * p
         return turn * below, a * below + p
 

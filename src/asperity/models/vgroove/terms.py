@@ -5,7 +5,9 @@ Without that one's integrals over many terms, which are for roughnesses up to `R
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import accumulate as running_sums
 from typing import Any
 
 import drjit as dr
@@ -13,7 +15,7 @@ import drjit as dr
 from ...microfacet.quadrature import accumulate
 from .fresnel import Fan, Reflectance, multiples, numerators, product, waves
 from .kaleidoscope import Pair
-from .symmetric import POLE, bounce_limits, cook_torrance_share, numbered
+from .symmetric import POLE, cook_torrance_share
 from .tilts import Tilts
 
 ROUGHEST = 1.5
@@ -41,6 +43,40 @@ def by_terms(pair: Pair, cos_i: Any, tilts: Tilts, most: Any, reflectance: Refle
     totals = accumulate(term, count, start, captured)
     scale = dr.rcp(4 * cos_i * pair.cos_delta)
     return scale * totals[-1], scale * totals[0]
+
+
+def bounce_limits(pair: Pair) -> list:
+    """Numbers that k stays below, for each kind of terms that `numbered` tells apart."""
+    theta, delta, both = pair.theta, pair.delta, pair.theta + pair.delta
+    half = dr.pi / 2
+    ranges = (half - theta, delta), (half + theta, both), (half - delta, theta), (half + delta, both)
+    return [above / dr.maximum(below, 1e-6) for above, below in ranges]
+
+
+def numbered(limits: Any, most: Any, first_even: int = 2) -> tuple[Any, Callable]:
+    """(n, f): how many terms of several bounces there are, and f(0..n-1) = (k, odd, tau) of each.
+
+    They are of four kinds: odd k with tau = 1, odd k with -1, even k with 1, even k with -1. Odd k begin at 3, even k
+    at ``first_even``; they end at ``most``, and below the kind's limit. Kind after kind, they are numbered without
+    gaps: in a loop over them no lane waits for others to find out that a term is empty.
+    """
+    Float, UInt, first_odd = type(limits[0]), type(most), 3
+
+    def terms(limit: Any, first: int) -> Any:  # how many of first, first + 2, ... are below it
+        beyond = UInt(dr.ceil(dr.minimum(dr.detach(limit), Float(most) + 1)))
+        return dr.select(beyond > first, (beyond + 1 - first) // 2, 0)
+
+    counts = map(terms, limits, (first_odd, first_odd, first_even, first_even))
+    ends = list(running_sums(counts))  # of the kinds' numbers
+
+    def term(index: Any) -> tuple[Any, Any, Any]:
+        odd = index < ends[1]
+        minus = dr.select(odd, index >= ends[0], index >= ends[2])
+        begin = dr.select(odd, dr.select(minus, ends[0], 0), dr.select(minus, ends[2], ends[1]))
+        k = 2 * (index - begin) + dr.select(odd, UInt(first_odd), UInt(first_even))
+        return k, odd, dr.select(minus, Float(-1), Float(1))
+
+    return ends[3], term
 
 
 @dataclass
