@@ -38,19 +38,13 @@ class Complex:
         """Those of the chosen way, by name."""
         return {name: getattr(self, name) for name in PARTS if getattr(self, name) is not None}
 
-    def settled(self) -> Metal | None:
-        """The metal, if it is the same everywhere, for good."""
+    def remake(self, made: Made, make: Callable[[Metal], Any]) -> None:
+        """Let ``made`` be what ``make`` makes of the metal, if that is the same everywhere, for good: else nothing."""
         if self.mirror or not settled(*self.textures().values()):
-            return None
-        return self._metal(dr.zeros(mi.SurfaceInteraction3f), True)
-
-    def update(self) -> None:
-        """Bring the fit up to date."""
-        metal = self.settled()
-        if metal is None:
-            self.fit.clear()
-        else:
-            self.fit.update(lambda *_: fitted(metal), *metal.eta, *metal.k)
+            made.clear()
+            return
+        metal = self._metal(dr.zeros(mi.SurfaceInteraction3f), True)
+        made.update(lambda *_: make(metal), *metal.eta, *metal.k)
 
     @property
     def mirror(self) -> bool:
@@ -61,7 +55,8 @@ class Complex:
         """Fresnel's reflectance at a surface point, a function of the cosine of incidence; 1 of a mirror."""
         if self.mirror:
             return mirror
-        return self._metal(si, active) if self.fit.result is None else self.fit.result
+        metal = self._metal(si, active)  # has derivatives, perhaps, that were not asked for at the last update
+        return metal if self.fit.result is None or dr.grad_enabled(metal) else self.fit.result
 
     def _metal(self, si: Any, active: Any) -> Metal:
         if self.eta is not None:
@@ -134,7 +129,7 @@ class Conductor(Parameter):
     def update(self, value: Any) -> None:
         """Bring its fit up to date."""
         if value is not None:
-            value.update()
+            value.remake(value.fit, fitted)
 
     def children(self, value: Any) -> Mapping[str, Any]:
         """The textures of the chosen way."""

@@ -573,8 +573,11 @@ def varies(texture: Any) -> bool:
 
 
 def settled(*textures: Any) -> bool:
-    """Whether what is made from textures now holds everywhere, at all wavelengths, and needs no derivatives."""
-    if mi.is_spectral or any(map(varies, textures)):
+    """Whether what is made from textures now holds everywhere, at all wavelengths, and needs no derivatives.
+
+    Not in a frozen function: it is recorded for the present numbers, and replayed for others.
+    """
+    if mi.is_spectral or any(map(varies, textures)) or dr.flag(dr.JitFlag.FreezingScope):
         return False
     return not any(dr.grad_enabled(value) for texture in textures for _, value in mi.traverse(texture).items())
 

@@ -22,6 +22,15 @@ CASES = {  # description and parameters
         {"type": "vgroove", "material": "Cu", "alpha": 0.4, "symmetric": False},
         ["alpha.value", "eta.value"],
     ),
+    "grooves, stretched": ({"type": "vgroove", "material": "Cu", "alpha_u": 0.2, "alpha_v": 0.5}, ["alpha_u.value"]),
+    "steep grooves": ({"type": "vgroove", "eta": 0.5, "k": 3.0, "alpha": 2.0}, ["alpha.value", "eta.value"]),
+    "two bounces": ({"type": "vgroove", "reflectivity": 0.8, "max_bounces": 2}, ["alpha.value", "reflectivity.value"]),
+    "Phong": ({"type": "vgroove", "distribution": "phong", "exponent": 20.0}, ["exponent.value"]),
+    "Phong, non-symmetric": (
+        {"type": "vgroove", "distribution": "phong", "alpha_u": 0.4, "alpha_v": 0.3, "symmetric": False},
+        ["alpha_u.value"],
+    ),
+    "metal grains": ({"type": "micrograin", "eta": 0.5, "k": 3.0}, ["tau_0.value", "beta.value", "k.value"]),
     "diffuse": (
         {"type": "micrograin", "specular": False, "base": {"type": "diffuse"}},
         ["tau_0.value", "beta.value", "diffuse_reflectance.value", "base.reflectance.value"],
@@ -87,7 +96,7 @@ CASES = {  # description and parameters
         ["base.eta.value"],  # by alpha, a difference is also of the directions that the base's albedo is sampled in
     ),
 }
-SLOW = {"multiple over vgroove", "diffracting, stretched"}
+SLOW = {"multiple over vgroove", "diffracting, stretched", "steep grooves", "Phong", "Phong, non-symmetric"}
 parametrised = pytest.mark.parametrize(
     "case", [pytest.param(case, marks=[pytest.mark.slow] if case in SLOW else []) for case in CASES]
 )
@@ -145,6 +154,31 @@ def test_backward_through_pointers(rgb, case):
     dr.enable_grad(by)
     dr.backward(dr.sum(two.value(by)[0]))
     assert dr.grad(by)[0] == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "case, key",
+    [
+        ("vgroove", "k.value"),
+        ("non-symmetric", "alpha.value"),
+        ("coated", "int_ior.value"),
+        ("metal grains", "k.value"),
+    ],
+)
+def test_derivatives_need_no_update(rgb, case, key):
+    """What was made once for parameters without derivatives is not used for those that have some."""
+    found = []
+    for update in (True, False):
+        bsdf = mi.load_dict(CASES[case][0])
+        params = mi.traverse(bsdf)
+        dr.enable_grad(params[key])
+        if update:
+            params.update()
+        value = dr.mean(bsdf.eval(mi.BSDFContext(), evaluate.interaction(pairs()[0]), pairs()[1]).x)
+        dr.backward(value)
+        found.append(np.array(dr.grad(params[key])))
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-5)
+    assert np.abs(found[0]).max() > 0
 
 
 RENDERED = {

@@ -105,14 +105,9 @@ def constants(f: Callable[[Metal], list], metal: Metal) -> list:
     """The spectra ``f(metal)`` of a metal that is the same everywhere; opaque, so that others need no other kernel.
 
     In double precision, without which fits lose digits. By plain numbers, since kernels for this would take a user's
-    time to compile; but in a frozen function, which replays kernels only, by them.
+    time to compile.
     """
     spectrum: Any = type(metal.eta)
-    if dr.flag(dr.JitFlag.FreezingScope):
-        double = dr.float64_array_t(spectrum)
-        found = [spectrum(one) for one in f(Metal(double(metal.eta), double(metal.k)))]
-        dr.make_opaque(found)
-        return found
     number: Any = dr.value_t(spectrum)
     opaque = (lambda value: number([value])) if dr.is_jit_v(number) else float
     return [spectrum(*map(opaque, one)) for one in zip(*map(f, by_channel(metal)))]

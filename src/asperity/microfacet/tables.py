@@ -115,11 +115,18 @@ class Made:
         self.result = self.constants = None
 
     def update(self, make: Callable, *constants: Any) -> None:
-        """Let ``result`` be ``make(*constants)``; of numbers, or of Dr.Jit arrays that hold one."""
+        """Let ``result`` be ``make(*constants)``; of numbers, or of Dr.Jit arrays that hold one.
+
+        Raises ParameterError in a frozen function, which would replay this for other numbers; Dr.Jit 1.5 even aborts.
+        """
         current = None
         if not dr.grad_enabled(constants):
             current = tuple(float(np.asarray(constant).item()) for constant in constants)
         if current is None or current != self.constants:
+            if dr.flag(dr.JitFlag.FreezingScope):
+                raise ParameterError(
+                    "A table is made from a parameter that changed inside a function under dr.freeze: update it outside."
+                )
             self.result, self.constants = make(*constants), current
 
 

@@ -3,8 +3,10 @@
 import asperity  # noqa: F401  isort: skip
 import drjit as dr
 import drjit.llvm.ad as llvm
+import mitsuba as mi
 import numpy as np
 import pytest
+from helpers import cosine_directions
 
 from asperity.microfacet.distributions import GGX, Beckmann, Phong
 from asperity.microfacet.fresnel import Metal
@@ -136,3 +138,12 @@ def test_steepness_is_a_logarithmic_derivative(kind, alpha):
     ]
     slope = (near[1] - near[0]) / np.log(0.29 / 0.27)
     assert float(tilts(kind, alpha).steepness()[0]) == pytest.approx(slope, abs=0.2, rel=0.08)
+
+
+def test_metals_that_reflect_nothing_at_normal_incidence(rgb):
+    """eta = 1 and k = 0 are allowed; a path of no weight then met a reflectance of 0 / 0."""
+    grooves = mi.load_dict({"type": "vgroove", "eta": 1.0, "k": 0.0, "alpha": 0.6})
+    wi, wo = (mi.Vector3f(cosine_directions(np.random.default_rng(n), 1000)) for n in (3, 4))
+    si = dr.zeros(mi.SurfaceInteraction3f, 1000)
+    si.wi = wi
+    assert np.isfinite(np.array(grooves.eval(mi.BSDFContext(), si, wo))).all()

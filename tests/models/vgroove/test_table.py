@@ -119,3 +119,19 @@ def test_few_bounces(rgb, most):
         for alpha in ({"alpha": 0.5}, {"alpha_u": 0.5, "alpha_v": 0.5})
     )
     assert tabulated == pytest.approx(integrated, rel=1.3e-2, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind, alpha", [*CASES, (GGX, 0.001), (GGX, 1.5), (Phong, 1.0)])
+def test_entries_are_finite(rgb, kind, alpha):
+    """At the horizon, where all that the table is made of vanishes, too."""
+    table = Tabulated.of(kind, alpha, 30, None)
+    assert np.isfinite(table.mirrors.entries.numpy()).all()
+
+
+def test_both_directions_at_the_horizon(rgb):
+    grooves = mi.load_dict({"type": "vgroove", "symmetric": False, "alpha": 1.0})
+    wi, wo = (dr.normalize(mi.Vector3f(1, 0, cos)) for cos in (0.01, 1e-5))
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = wi
+    value, pdf = grooves.eval_pdf(mi.BSDFContext(), si, wo)
+    assert np.isfinite(value.numpy()).all() and np.isfinite(pdf.numpy()).all()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -104,7 +103,7 @@ class Micrograin(LobeModel):
             self._check_second_colour()
         if self.masking == "smith" and (self.scattering != "single" or self.variation != "none"):
             raise ParameterError('masking = "smith": its grains scatter once and have no height; leave out the rest.')
-        self.losses, self.fittable = Made(), False
+        self.losses = Made()
 
     def _check_second_colour(self) -> None:
         metal = self.grains == "metal"
@@ -127,11 +126,9 @@ class Micrograin(LobeModel):
         if self.grains != "coated" or varies(self.int_ior) or varies(self.ext_ior):
             return None
         eta = constant("int_ior", self.int_ior) / constant("ext_ior", self.ext_ior)
-        if dr.grad_enabled(eta):
+        if dr.grad_enabled(eta) or dr.flag(dr.JitFlag.FreezingScope):  # replayed for other numbers
             return None
-        with suppress(RuntimeError):  # updated in a function under dr.freeze, which knows no numbers: as it was before
-            self.fittable = FITTED[0] <= float(dr.slice(eta)) <= FITTED[1]
-        return fit(eta) if self.fittable else None
+        return fit(eta) if FITTED[0] <= float(dr.slice(eta)) <= FITTED[1] else None
 
     def flags(self) -> list[int]:
         """A glossy lobe but for diffuse grains, a diffuse one but for metal, and that of ``multiple``."""
@@ -172,7 +169,10 @@ class Micrograin(LobeModel):
         if self.variation == "normal":
             sin, cos = dr.sincos(dr.deg2rad(at("variation_azimuth")))
             second = SecondColour(cos, sin)
-        coat = Coat(at("int_ior") / at("ext_ior"), self.coat) if self.grains == "coated" else None
+        coat = None
+        if self.grains == "coated":
+            eta = at("int_ior") / at("ext_ior")
+            coat = Coat(eta, None if dr.grad_enabled(eta) else self.coat)
         return Material(
             at("metal"), at("metal_2"), coat, at("diffuse_reflectance"), at("diffuse_reflectance_2"), second
         )

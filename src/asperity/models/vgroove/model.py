@@ -48,8 +48,9 @@ SMOOTHEST = 1e-3
 class VGroove(LobeModel):
     """Metal whose microfacets pair up to V-shaped grooves, in which light is reflected as often as it takes.
 
-    Without noise, and exact for its geometry but for some .1 %. Facets of equal tilt (``symmetric``, fast) leave a
-    sharp glint in the mirror direction, whatever the roughness; facets of independent tilts soften it, by quadrature.
+    Without noise, and exact for its geometry but for some .1 %, 1 % at worst. Facets of equal tilt (``symmetric``,
+    fast) leave a sharp glint in the mirror direction, whatever the roughness; facets of independent tilts soften it, by
+    a table, or by quadrature.
     """
 
     citation = CITATION
@@ -105,6 +106,8 @@ class VGroove(LobeModel):
     def update(self) -> None:
         """Bring up to date what is made from the parameters."""
         needed, alpha = needed_bounces if self.symmetric else needed_bounces_nonsymmetric, self._roughest()
+        if dr.flag(dr.JitFlag.FreezingScope):
+            alpha = None  # what is recorded has to be right for other numbers, too
         most = self.max_bounces or (MOST if alpha is None else needed(self.kind, alpha))
         if alpha is not None and not self.max_bounces and most == MOST:
             lost = f"alpha = {alpha:g}: more than 0.1 % of the light bounces over {MOST} times, and is lost."
@@ -112,11 +115,9 @@ class VGroove(LobeModel):
         self.most = dr.opaque(mi.UInt32, most) if dr.is_jit_v(mi.Float) else most
         self.few = min(most, WRITTEN + 1)
         self.rough = alpha is None or alpha > ROUGHEST
-        metal = self.metal.settled()
-        if metal is None:
-            self.fits.clear()
-        else:
-            self.fits.update(lambda *_: fit_constant(metal), *metal.eta, *metal.k)
+        # Of a model, dr.freeze sees the arrays alone: as many of them as there are forms of the sum tell these apart.
+        self.form = [self.most] * (WRITTEN + 2 if self.rough else self.few)
+        self.metal.remake(self.fits, fit_constant)
         self._tabulate(most)
 
     def flags(self) -> list[int]:
@@ -128,11 +129,14 @@ class VGroove(LobeModel):
         reflectance = None
         if not self.metal.mirror:
             once = self.at("metal", si, active)
-            reflectance = Reflectance(once, *(self.fits.result or (fit(once), None)))
-        brdf = self.table.result or nonsymmetric
+            known = None if dr.grad_enabled(once) else self.fits.result
+            reflectance = Reflectance(once, *(known or (fit(once), None)))
+        distribution = self.kind(*self._alphas(si, active))
+        differentiated = dr.grad_enabled(distribution) or dr.grad_enabled(reflectance)
+        brdf = nonsymmetric if self.table.result is None or differentiated else self.table.result
         if self.symmetric:
             brdf = by_terms if self.rough else partial(symmetric, few=self.few)
-        return [GrooveLobe(self.kind(*self._alphas(si, active)), brdf, self.symmetric, self.most, reflectance)]
+        return [GrooveLobe(distribution, brdf, self.symmetric, self.most, reflectance)]
 
     def _alphas(self, si: Any, active: Any) -> tuple[Any, Any]:
         if self.alpha is None:

@@ -246,7 +246,7 @@ class Light:
             pairs.append((self.length * side.cos_q * cos, self.length * side.sin_q * sin))
         if groove.k < 4:
             ((mean, half),) = pairs
-            found = self.reflectance.few(mean + half) * self.reflectance.few(greater(mean - half, 0))
+            found = self.reflectance.few(greater(mean + half, 0)) * self.reflectance.few(greater(mean - half, 0))
         else:
             found = through(self.reflectance.logarithm, [a + b for a, b in zip(*(with_partner(*two) for two in pairs))])
         return found * self.once if groove.odd else found

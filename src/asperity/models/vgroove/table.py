@@ -22,7 +22,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...microfacet.distributions import Distribution
-from ...microfacet.fast import greater, reciprocals
+from ...microfacet.fast import greater, lesser, reciprocals
 from ...microfacet.tables import Table
 from .fresnel import Reflectance
 from .kaleidoscope import Pair
@@ -39,8 +39,8 @@ FINE, COARSE = (12, 24), (6, 12)
 """Nodes of the quadrature for T and, as a quotient of two sums, for R: more than each ray can afford."""
 ROUGHEST = 1.5
 """Beyond this roughness steep grooves are so many that the table has errors of several per cent: at it 1.3 %."""
-EDGE = 0.02
-"""How far inside, in cells, the last nodes are computed: at the edges themselves all is 0 / 0."""
+EDGE, INSIDE = 0.02, 1e-5
+"""How far inside, in cells and in radians, the last nodes are computed: at the edges themselves all is 0 / 0."""
 
 
 @dataclass
@@ -126,9 +126,10 @@ def _pairs(layout: Layout, alpha: float, shape: tuple) -> Pair:
     index = dr.arange(mi.UInt32, math.prod(shape))
     columns, depth = shape[1], math.prod(shape[2:])
     nodes = Layout(alpha).theta(np.minimum(np.linspace(0, 1, shape[0]), 1 - EDGE / shape[0]))
+    nodes = np.minimum(nodes, HALF - 10 * INSIDE)
     theta = dr.gather(mi.Float, mi.Float(nodes.astype(np.float32)), index // (columns * depth))
     y = mi.Float(index // depth % columns) / (columns - 1)
-    delta = layout.delta(dr.minimum(y, 1 - EDGE / columns), theta)
+    delta = lesser(layout.delta(dr.minimum(y, 1 - EDGE / columns), theta), HALF - theta - INSIDE)
     length = dr.square(mi.Float(index % depth) / (depth - 1)) if depth > 1 else mi.Float(1)
     (sin, cos), (sin_delta, cos_delta) = dr.sincos(theta), dr.sincos(delta)
     return Pair(mi.Float(1), mi.Float(0), theta, sin, cos, delta, sin_delta, cos_delta, length)
