@@ -100,7 +100,7 @@ def turned_up(w: np.ndarray) -> np.ndarray:
 
 
 def inputs(kind: str, materials: int) -> Iterator[tuple[dict, np.ndarray, np.ndarray]]:
-    """(material, wi, wo), the same in every version of the code."""
+    """(material, wi, wo), the same in all versions of the code that know the same kinds."""
     rng = np.random.default_rng(sorted(KINDS).index(kind))
     for _ in range(materials):
         material = KINDS[kind](rng)

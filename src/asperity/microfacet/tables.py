@@ -125,7 +125,7 @@ class Made:
         if current is None or current != self.constants:
             if dr.flag(dr.JitFlag.FreezingScope):
                 raise ParameterError(
-                    "A table is made from a parameter that changed inside a function under dr.freeze: update it outside."
+                    "A table is made from a parameter that changed in a function under dr.freeze: update it outside."
                 )
             self.result, self.constants = make(*constants), current
 
