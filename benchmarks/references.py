@@ -18,7 +18,7 @@ import numpy as np
 
 from asperity.microfacet.fresnel import conductor
 from asperity.microfacet.quadrature import gauss_legendre
-from asperity.models.micrograin.grains import Grains, exposure
+from asperity.models.micrograin.grains import Grains, density, exposure
 from asperity.models.micrograin.material import Material
 from asperity.models.micrograin.shadows import Shadows, shadow
 from asperity.models.micrograin.specular import Specular
@@ -28,9 +28,9 @@ from asperity.models.vgroove.symmetric import POLE, cook_torrance_share
 from asperity.models.vgroove.tilts import Tilts
 
 Double, Vector, Index = llvm.Float64, llvm.Array3f64, llvm.UInt
-PIECES, NODES = 4, 16
+PIECES, NODES = 4, 32
 """Of the integral over a partner's tilt, for every number of bounces: Gauss-Legendre in each piece."""
-HEIGHTS, AZIMUTHS = 96, 96
+HEIGHTS, AZIMUTHS = 192, 96
 """Nodes on a grain, of the azimuths on either lit arc."""
 
 
@@ -135,7 +135,9 @@ def grains(material: dict, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
     """
     model = mi.load_dict(material).model
     betas = (opaque(np.float32(material.get("beta", material.get(name)))) for name in ("beta_x", "beta_y"))
-    here, raw = Grains.of(opaque(np.float32(material["tau_0"])), *betas), Vector(wo.astype(float))
+    tau_0, raw = np.float32(material["tau_0"]), Vector(wo.astype(float))
+    # What stands for tau_0 = 1 depends on the precision.
+    here = Grains(opaque(tau_0), opaque(density(llvm.Float(tau_0))[0]), *betas)
     i, o = here.lift(Vector(wi.astype(float))), here.lift(raw)
     if model.grains == "metal":
         value, pdf = Specular(here, Material(metal=lambda cos: 1), Shadows.union).eval_pdf(i, o)
