@@ -120,11 +120,14 @@ def results(kind: str, materials: int) -> np.ndarray:
 
 
 def exact(kind: str, materials: int) -> np.ndarray:
-    """The same by `references`; None where there is none."""
+    """The same by `references`."""
     return np.stack([REFERENCES[given["type"]](given, wi, wo) for given, wi, wo in inputs(kind, materials)])
 
 
-def row(kind: str, before: np.ndarray, after: np.ndarray) -> list[str]:
+def row(kind: str, before: np.ndarray, after: np.ndarray, which: list[int] | None = None) -> list[str]:
+    """Of all materials, or of these."""
+    which = list(range(len(after))) if which is None else which
+    before, after = before[which], after[which]
     cells, wrong = [], ~np.isfinite(after) & np.isfinite(before)
     for part in (slice(0, 3), slice(3, 4)):
         was, now = before[:, part], after[:, part]
@@ -132,7 +135,7 @@ def row(kind: str, before: np.ndarray, after: np.ndarray) -> list[str]:
         error = np.where(np.isfinite(was) & np.isfinite(now), error, 0)
         cells += [f"{np.percentile(error, q):.2g}" for q in (50, 99, 99.5, 99.9, 100)]
         material, _, lane = np.unravel_index(error.argmax(), error.shape)
-        cells.append(f"{material}:{lane}")
+        cells.append(f"{which[material]}:{lane}")
     return [kind, *cells, str(int(wrong.sum()))]
 
 
@@ -163,6 +166,9 @@ def show(pairs: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
     table = Table("", *columns, "not finite", title="relative differences (absolute / 1e-3 below 1e-3)")
     for kind, pair in pairs.items():
         table.add_row(*row(kind, *pair))
+        isotropic = [n for n, (given, *_) in enumerate(inputs(kind, len(pair[0]))) if given.keys() & {"alpha", "beta"}]
+        if isotropic:
+            table.add_row(*row("  of these, isotropic", *pair, isotropic))
     Console(width=180).print(table)
 
 

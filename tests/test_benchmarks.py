@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-MATERIALS = 2
+MATERIALS = 3
 ALLOWED = {
     "vgroove": (0.003, 99.9, 0.01),
     "vgroove, non-symmetric": (0.025, 99.9, 0.06),  # by quadrature; by table .3 and 1 %

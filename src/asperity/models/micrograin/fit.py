@@ -6,6 +6,8 @@ whole range of parameters. Nothing imports this module when rendering.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import drjit as dr
 import drjit.llvm.ad as llvm
 import numpy as np
@@ -58,7 +60,7 @@ CUBIC = np.linalg.inv(np.arange(-1.0, 3)[:, None] ** np.arange(4))
 """From values at -1, 0, 1, 2 to the coefficients of their cubic."""
 
 
-def lit_heights(rng: np.random.Generator, n: int):
+def lit_heights(rng: np.random.Generator, n: int) -> Callable[[float], np.ndarray]:
     """The function t -> (2 n): integrands of `diffuse.lambertian` for albedo 1, value and density, on [0, 1].
 
     A third of the directions are spread by the cosine, a third is grazing; of all, some are near each other's mirror
