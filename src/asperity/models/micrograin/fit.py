@@ -1,7 +1,12 @@
 """How `diffuse.HEIGHTS` is made: ``python -m asperity.models.micrograin.fit``.
 
 Prints a rule, ready to paste, with its errors and with those of the digits in diffuse.py, of round grains over the
-whole range of parameters. Nothing imports this module when rendering.
+whole range of parameters. Needs five minutes; nothing imports this module when rendering.
+
+The digits in diffuse.py are of an earlier script, whose inputs were drawn a little otherwise. Of 24 000 inputs that
+neither has seen, half of the directions grazing, the values' errors are .044 % in the median, .39 % at 99.5 % and 1.7 %
+at worst; those of diffuse.py .031, .42 and 2.9 %; the densities' .049, .47 and 1.7 %, against .036, .48 and 2.8 %.
+FRONT and BACK in diffuse.py are not made here.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ from .grains import Grains, exposure
 from .material import Facet
 from .shadows import Shadows, shadow
 
-INPUTS, GRID, EXACT = 12_000, 800, 200
+INPUTS, GRID, EXACT = 24_000, 800, 200
 LEAST = 1e-3
 """Integrals below this count by their absolute errors."""
 NORMS = 2, 4, 8, 12
@@ -121,7 +126,7 @@ def fitted(integrands: Integrands, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     t, weight = map(np.array, gauss_legendre(nodes))
     x = np.log(np.concatenate([np.diff(t, prepend=0, append=1), weight]))
     for exponent in NORMS:
-        x = minimize(norm, x, args=(exponent,), jac=True, method="L-BFGS-B", options={"maxiter": 150, "maxcor": 30}).x
+        x = minimize(norm, x, args=(exponent,), jac=True, method="L-BFGS-B", options={"maxiter": 250, "maxcor": 30}).x
     return rule(x)[:2]
 
 
