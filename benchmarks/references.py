@@ -18,7 +18,7 @@ import numpy as np
 
 from asperity.microfacet.fresnel import conductor
 from asperity.microfacet.quadrature import gauss_legendre
-from asperity.models.micrograin.grains import Grains, density, exposure
+from asperity.models.micrograin.grains import Grains, SecondColour, density, exposure
 from asperity.models.micrograin.material import Material
 from asperity.models.micrograin.shadows import Shadows, shadow
 from asperity.models.micrograin.specular import Specular
@@ -134,10 +134,10 @@ def grains(material: dict, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
     Areas in shadow are closed as well; their angles, by fast functions, are good to 1e-7.
     """
     model = mi.load_dict(material).model
-    betas = (opaque(np.float32(material.get("beta", material.get(name)))) for name in ("beta_x", "beta_y"))
+    betas = (np.float32(material.get("beta", material.get(name))) for name in ("beta_x", "beta_y"))
     tau_0, raw = np.float32(material["tau_0"]), Vector(wo.astype(float))
-    # What stands for tau_0 = 1 depends on the precision.
-    here = Grains(opaque(tau_0), opaque(density(llvm.Float(tau_0))[0]), *betas)
+    r = density(llvm.Float(tau_0))[0]  # in float32, since what stands for tau_0 = 1 depends on the precision
+    here = Grains(*(Double(np.full(wi.shape[1], x, dtype=float)) for x in (tau_0, r, *betas)))
     i, o = here.lift(Vector(wi.astype(float))), here.lift(raw)
     if model.grains == "metal":
         value, pdf = Specular(here, Material(metal=lambda cos: 1), Shadows.union).eval_pdf(i, o)
@@ -145,7 +145,9 @@ def grains(material: dict, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
         value = value.numpy() * np.array([conductor(cos, *index) for index in indices(model)] or np.ones((3, 1)))
     else:
         eta = opaque(np.float32(material["int_ior"])) if model.grains == "coated" else None
-        first, second, pdf = lambertian(here, i, o, eta, material.get("variation"))
+        second = {"height": SecondColour(), "normal": SecondColour(1, 0)}.get(material.get("variation"))
+        first, second, pdf = lambertian(here, i, o, eta, second)
+        pdf = pdf / here.visible(i)
         value = np.outer(albedo(material, "diffuse_reflectance"), first)
         value = value + np.outer(albedo(material, "diffuse_reflectance_2"), second)
     if model.grains == "coated":
@@ -168,16 +170,17 @@ def dielectric(cos: Any, eta: Any) -> Any:
     return (dr.square((cos - g) / (cos + g)) + dr.square((eta * eta * cos - g) / (eta * eta * cos + g))) / 2
 
 
-def lambertian(here: Grains, i: Any, o: Any, eta: Any, variation: str | None) -> tuple[Any, Any, Any]:
-    """(f cos_o of the first colour for albedo 1, that of the second, density) (Lucas 2024, Eq. 21).
+def lambertian(here: Grains, i: Any, o: Any, eta: Any, second_colour: Any) -> tuple:
+    """(f cos_o of the first colour for albedo 1, that of the second, density times tau_i) (Lucas 2024, Eq. 21).
 
     By Gauss-Legendre in (1 - h)^(1/3), since at grazing only the tops are seen, and around in each lit arc: there in an
     angle t that is more even than the azimuth x if the grain is not round, tan x = k tan t from its axis.
     """
-    n, visible = dr.width(i.x), here.visible(i)
+    n = dr.width(i.x)
     t, weight = map(np.array, gauss_legendre(HEIGHTS))
     h, weight = (Double(np.tile(x, n)) for x in (1 - t**3, weight * 3 * t**2))
     wi, wo = (Vector(*(dr.repeat(x, HEIGHTS) for x in w)) for w in (i, o))
+    here = Grains(*(dr.repeat(x, HEIGHTS) for x in (here.tau_0, here.r, here.beta_x, here.beta_y)))
     i, o = here.to_sphere(wi), here.to_sphere(wo)
     radius, beta_x, beta_y = dr.sqrt(1 - h * h), here.beta_x, here.beta_y
     k = dr.sqrt(dr.norm(llvm.Array2f64(beta_x * radius, h)) / dr.norm(llvm.Array2f64(beta_y * radius, h)))
@@ -198,7 +201,7 @@ def lambertian(here: Grains, i: Any, o: Any, eta: Any, variation: str | None) ->
             pdf, value = pdf + part * cos_o, part * cos_o
             if eta is not None:
                 value = value * (1 - dielectric(cos_i, eta)) * (1 - dielectric(cos_o, eta))
-            share = {"height": h, "normal": (1 + m.x) / 2}.get(variation, 0)
+            share = 0 if second_colour is None else second_colour(h, m)
             return index + 1, first + value * (1 - share), second + value * share, pdf
 
         start = Index(0), *(dr.zeros(Double, dr.width(h)) for _ in range(3))
@@ -208,8 +211,7 @@ def lambertian(here: Grains, i: Any, o: Any, eta: Any, variation: str | None) ->
     first, second, pdf = map(sum, zip(*(around(begin, end - begin) for begin, end in arcs)))
     exposed, seen = (exposure(here.r, h, area) for area in (Shadows(i, o).union(h), shadow(i, h)))
     scale = weight * here.r / (dr.pi * i.z)
-    first, second, pdf = (dr.block_sum(scale * x, HEIGHTS) for x in (exposed * first, exposed * second, seen * pdf))
-    return first, second, pdf / visible
+    return tuple(dr.block_sum(scale * x, HEIGHTS) for x in (exposed * first, exposed * second, seen * pdf))
 
 
 def lit_arcs(i: Any, o: Any, h: Any, radius: Any) -> list[tuple[Any, Any]]:

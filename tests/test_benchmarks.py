@@ -1,4 +1,4 @@
-"""Models against the references of `benchmarks/accuracy.py --exact`."""
+"""The benchmarks' scripts: models against the references of `benchmarks/accuracy.py --exact`."""
 
 import importlib
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 MATERIALS = 3
 ALLOWED = {
     "vgroove": (0.003, 99.9, 0.01),
-    "vgroove, non-symmetric": (0.025, 99.9, 0.06),  # by quadrature; by table .3 and 1 %
+    "vgroove, non-symmetric": (0.015, 99.9, 0.03),  # the fit of chromium
     "micrograin, metal": (1e-4, 100, 1e-4),
     "micrograin, diffuse": (0.005, 99.5, 0.01),
     "micrograin, coated": (0.005, 99.5, 0.01),
