@@ -1,7 +1,8 @@
-"""What two versions of the code differ by: value and density of 10^5 random inputs for each kind of material.
+"""Errors of value and density, for 10^5 random inputs of each kind of material; or how two versions of the code differ.
 
-    python benchmarks/accuracy.py --save before.npz             # in the one
-    python benchmarks/accuracy.py --against before.npz          # in the other
+    python benchmarks/accuracy.py --exact                       # against `references`: some minutes
+    python benchmarks/accuracy.py --save before.npz             # in one version
+    python benchmarks/accuracy.py --against before.npz          # in another
 
 Inputs cover all that is allowed. Of the pairs of directions six tenths are spread by the cosine; a tenth each is at
 grazing angles, close to retro-reflection, close to the mirror direction, and in exactly degenerate positions.
@@ -15,6 +16,7 @@ from collections.abc import Iterator
 import asperity  # noqa: F401  isort: skip
 import mitsuba as mi
 import numpy as np
+from references import REFERENCES
 from rich.console import Console
 from rich.table import Table
 
@@ -117,7 +119,15 @@ def results(kind: str, materials: int) -> np.ndarray:
     return np.stack(found)
 
 
-def row(kind: str, before: np.ndarray, after: np.ndarray) -> list[str]:
+def exact(kind: str, materials: int) -> np.ndarray:
+    """The same by `references`."""
+    return np.stack([REFERENCES[given["type"]](given, wi, wo) for given, wi, wo in inputs(kind, materials)])
+
+
+def row(kind: str, before: np.ndarray, after: np.ndarray, which: list[int] | None = None) -> list[str]:
+    """Of all materials, or of these."""
+    which = list(range(len(after))) if which is None else which
+    before, after = before[which], after[which]
     cells, wrong = [], ~np.isfinite(after) & np.isfinite(before)
     for part in (slice(0, 3), slice(3, 4)):
         was, now = before[:, part], after[:, part]
@@ -125,7 +135,7 @@ def row(kind: str, before: np.ndarray, after: np.ndarray) -> list[str]:
         error = np.where(np.isfinite(was) & np.isfinite(now), error, 0)
         cells += [f"{np.percentile(error, q):.2g}" for q in (50, 99, 99.5, 99.9, 100)]
         material, _, lane = np.unravel_index(error.argmax(), error.shape)
-        cells.append(f"{material}:{lane}")
+        cells.append(f"{which[material]}:{lane}")
     return [kind, *cells, str(int(wrong.sum()))]
 
 
@@ -133,6 +143,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--save", metavar="FILE", help="write what this version finds")
     parser.add_argument("--against", metavar="FILE", help="compare with what another found")
+    parser.add_argument("--exact", action="store_true", help="compare with double precision without approximations")
     parser.add_argument("--only", default="", help="part of the kinds' names")
     parser.add_argument("--materials", type=int, default=MATERIALS, help="of each kind")
     asked = parser.parse_args()
@@ -141,12 +152,24 @@ def main() -> None:
     if asked.save:
         np.savez_compressed(asked.save, **found)
     if asked.against:
-        columns = [f"{what} {q}" for what in ("f", "pdf") for q in ("50 %", "99", "99.5", "99.9", "worst", "where")]
-        table = Table("", *columns, "not finite", title="relative differences (absolute / 1e-3 below 1e-3)")
         with np.load(asked.against) as before:
-            for kind, after in found.items():
-                table.add_row(*row(kind, before[kind][: asked.materials], after))
-        Console(width=180).print(table)
+            show({kind: (before[kind][: asked.materials], after) for kind, after in found.items()})
+    if asked.exact:
+        show({kind: (exact(kind, asked.materials), after) for kind, after in found.items() if kind != "lambertsphere"})
+        if "lambertsphere" in found:
+            print("lambertsphere: no reference")
+
+
+def show(pairs: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
+    """A table of what each kind should be, and is."""
+    columns = [f"{what} {q}" for what in ("f", "pdf") for q in ("50 %", "99", "99.5", "99.9", "worst", "where")]
+    table = Table("", *columns, "not finite", title="relative differences (absolute / 1e-3 below 1e-3)")
+    for kind, pair in pairs.items():
+        table.add_row(*row(kind, *pair))
+        isotropic = [n for n, (given, *_) in enumerate(inputs(kind, len(pair[0]))) if given.keys() & {"alpha", "beta"}]
+        if isotropic:
+            table.add_row(*row("  of these, isotropic", *pair, isotropic))
+    Console(width=180).print(table)
 
 
 if __name__ == "__main__":

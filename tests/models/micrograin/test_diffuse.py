@@ -1,6 +1,9 @@
 """The quadrature over Lambertian grains."""
 
 import asperity  # noqa: F401  isort: skip
+import importlib
+from pathlib import Path
+
 import drjit.llvm.ad as llvm
 import drjit.scalar as scalar
 import numpy as np
@@ -10,53 +13,14 @@ from helpers import directions, unit
 from asperity.models.micrograin.coat import Coat, fit
 from asperity.models.micrograin.diffuse import Facet, lambertian
 from asperity.models.micrograin.grains import Grains, SecondColour
-from asperity.models.micrograin.shadows import Shadows, shadow
-
-HEIGHTS, AZIMUTHS = 96, 1024
+from asperity.models.micrograin.shadows import Shadows
 
 
-def reference(grains, wi, wo, facet):
-    """(first, second, pdf) of `lambertian` in double precision: many heights, crowded at the top, and whole rings."""
-    t, weights = np.polynomial.legendre.leggauss(HEIGHTS)
-    h, weights = 1 - ((1 - t) / 2) ** 3, 1.5 * ((1 - t) / 2) ** 2 * weights
-    tau_0, *betas = (np.array(x) for x in (grains.tau_0, grains.beta_x, grains.beta_y))
-    stretch = np.array([*betas, np.ones_like(tau_0)])
-    x = 2 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
-    i, o = (stretch * w / np.linalg.norm(stretch * w, axis=0) for w in (wi, wo))
-    shadows, i_only = Shadows(llvm.Array3f64(i), llvm.Array3f64(o)), llvm.Array3f64(i)
-    r, found = np.array(grains.r), np.zeros((3, len(tau_0)))
-    for height, weight in zip(h, weights):
-        ring = np.stack([np.sqrt(1 - height**2) * np.cos(x), np.sqrt(1 - height**2) * np.sin(x), height + 0 * x])
-        m = stretch[:, :, None] * ring[:, None]
-        length = np.linalg.norm(m, axis=0)
-        cos_i, cos_o = (np.maximum(np.einsum("cl,clx->lx", w, m), 0) / length for w in (wi, wo))
-        # (i'.m') (E o.m') / |E m'|
-        lit = cos_i * length / np.linalg.norm(stretch * wi, axis=0)[:, None] * cos_o
-        through = lit
-        if facet.coat:
-            through = (
-                lit
-                * fresnel_through(cos_i, float(np.ravel(facet.coat.eta)[0]))
-                * fresnel_through(cos_o, float(np.ravel(facet.coat.eta)[0]))
-            )
-        share = 0
-        if facet.second:
-            share = height if facet.second.by_height else (1 + (0.8 * m[0] + 0.6 * m[1]) / length) / 2
-        disc = np.pi * (1 - height**2)
-        exposed, visible = (
-            weight * np.exp(-r * (disc + np.array(area)))
-            for area in (shadows.union(llvm.Float64(height)), shadow(i_only, llvm.Float64(height)))
-        )
-        rings = [(through * (1 - share)).mean(-1), (through * share).mean(-1), lit.mean(-1)]
-        found = found + np.stack([exposed, exposed, visible]) * rings
-    return found * 2 * r / i[2]
-
-
-def fresnel_through(cos, eta):
-    """1 - F, from the two amplitudes."""
-    inside = np.sqrt(np.maximum(1 - (1 - cos**2) / eta**2, 0))
-    s, p = (cos - eta * inside) / (cos + eta * inside), (inside - eta * cos) / (inside + eta * cos)
-    return np.where(inside > 0, 1 - (s * s + p * p) / 2, 0)
+@pytest.fixture
+def reference(monkeypatch):
+    """`lambertian` in double precision, by many nodes: that of the benchmarks."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[3] / "benchmarks")
+    return importlib.import_module("references").lambertian
 
 
 FACETS = {
@@ -70,7 +34,7 @@ FITTED = FACETS | {f"fitted {eta}": Facet(SecondColour(), Coat(eta, "fit")) for 
 
 @pytest.mark.parametrize("isotropic", [True, False], ids=["isotropic", "anisotropic"])
 @pytest.mark.parametrize("facet", FITTED)
-def test_quadrature(rgb, facet, isotropic):
+def test_quadrature(rgb, reference, facet, isotropic):
     """Cosines from 1e-3, betas of 0.1 to 5: half a percent for 99.5 %, 1 % at worst, where above 1e-3.
 
     Of more inputs, and of axes as 1 to 20 or more, a few in 10^4 are beyond 1 % (docs/micrograin.md).
@@ -90,7 +54,8 @@ def test_quadrature(rgb, facet, isotropic):
         return Grains.of(*map(Float, (tau_0, *betas)))
 
     i, o = (np.array(grains(llvm.Float64).lift(llvm.Array3f64(w))) for w in (i, o))
-    exact = reference(grains(llvm.Float64), i, o, facet)
+    pairs = map(llvm.Array3f64, (i, o))
+    exact = map(np.array, reference(grains(llvm.Float64), *pairs, facet.coat and facet.coat.eta, facet.second))
     ours = lambertian(grains(llvm.Float), llvm.Array3f(i), llvm.Array3f(o), Shadows.union, facet, isotropic=isotropic)
     for found, expected in zip(map(np.array, ours), exact):
         error = np.abs(found - expected) / np.maximum(expected, 1e-3)
