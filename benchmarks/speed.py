@@ -84,7 +84,7 @@ DIFFRACTING = {
     "twoscale, conserving": {**TWO_SCALES, "energy": "conserving"},
     "twoscale, anisotropic": {"type": "twoscale", "material": "Au", "p": 0.7, "alpha_u": 0.14, "alpha_v": 0.07},
 }
-FULL = {"size": 256, "spp": 32, "rounds": 11, "lanes": 1 << 21}
+FULL = {"size": 160, "spp": 16, "rounds": 7, "lanes": 1 << 21}
 QUICK = {"size": 96, "spp": 8, "rounds": 3, "lanes": 1 << 19}
 EXTRA = {
     *(f"micrograin, {name}" for name in ("NDF sampling, masking: height", "NDF sampling", "GGX visible normals")),
