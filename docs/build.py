@@ -48,7 +48,8 @@ def speed_table(name: str, report: dict) -> str:
     heads = [f"`{call}`, ns" for call in CALLS] + [f"frame, *{scene}*" for scene in FRAMES]
     lines = ["| | " + " | ".join(heads) + " |", "|" + "---|" * (len(heads) + 1)]
     for row, found in {reference: report["rows"][reference], **rows}.items():
-        cells = [f"{found[call]['time'][1]:.2g}" for call in CALLS]
+        times = [found[call]["time"][1] for call in CALLS]
+        cells = [f"{time:.0f}" if time > 10 else f"{time:.2g}" for time in times]
         cells += ["1" if row == reference else spread(found[scene]["ratio"]) for scene in FRAMES]
         lines.append(f"| {row if row == reference else row.removeprefix(f'{name}, ')} | " + " | ".join(cells) + " |")
     note = (
