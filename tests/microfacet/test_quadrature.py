@@ -129,10 +129,9 @@ def test_few_nodes_are_reciprocal_and_know_no_azimuth():
 
 @pytest.mark.parametrize("forward", [True, False], ids=["forward", "backward"])
 def test_integrals_over_normals_have_derivatives(forward):
-    """By the roughness, and by what is captured, against differences of plain floats.
+    """By the roughness and by what is captured, against differences of plain floats.
 
-    The first are those of the integral: of sums by as many nodes they are .1 % off. Forward from one of the two alone:
-    Dr.Jit 1.5 refuses if the other, which a loop takes too, may have derivatives.
+    Forward from one of them alone: Dr.Jit 1.5 refuses if the other, which a loop takes too, may have derivatives.
     """
     alpha, scale, w = 0.4, 1.5, dr.normalize(dr.scalar.Array3f64(0.6, 0.3, 0.5))
 
@@ -140,7 +139,7 @@ def test_integrals_over_normals_have_derivatives(forward):
         return (captured[0] * seen(m, captured[1])[0] ** 2,)
 
     def total(alpha, scale, w):
-        return over_normals(term, Beckmann(alpha, 0.2), w, (scale, w), 32, 16)[0]
+        return over_normals(term, Beckmann(alpha, 0.2), w, (scale, w), 4, 8)[0]
 
     def slope(f):
         return (f(1e-5) - f(-1e-5)) / 2e-5
@@ -152,31 +151,7 @@ def test_integrals_over_normals_have_derivatives(forward):
     assert value[0] == pytest.approx(total(alpha, scale, w), rel=1e-12)
     if forward:
         dr.forward(parameters[0])
-        assert dr.grad(value)[0] == pytest.approx(expected[0], rel=1e-3)
+        assert dr.grad(value)[0] == pytest.approx(expected[0], rel=1e-7)
     else:
         dr.backward(value)
-        assert dr.grad(parameters[0])[0] == pytest.approx(expected[0], rel=1e-3)
-        assert dr.grad(parameters[1])[0] == pytest.approx(expected[1], rel=1e-7)
-
-
-@pytest.mark.parametrize("kind", [GGX, Beckmann, Gaussian, Phong])
-def test_derivatives_by_the_roughness_see_steps(kind):
-    """Of the share of facets that face w by a third: between nodes that move, nothing of it would change.
-
-    Of 16 x 16 nodes, against differences of a sum of 128 x 128: 6 % rms off. Those of nodes that moved were 0.
-    """
-    w = llvm.Array3f64(directions(np.random.default_rng(5), 500, lowest=0.1))
-
-    def total(alpha, *nodes):
-        def steep(m, w):
-            return (dr.select(dr.dot(dr.normalize(m), w) > 1 / 3, llvm.Float64(1), 0),)
-
-        return over_normals(steep, kind(alpha, alpha), w, w, *nodes)[0]
-
-    alpha = llvm.Float64(0.4)
-    dr.enable_grad(alpha)
-    value = total(alpha, 16, 16)
-    dr.forward(alpha)
-    expected = np.array(total(llvm.Float64(0.42), 128, 128) - total(llvm.Float64(0.38), 128, 128)) / 0.04
-    found = np.array(dr.grad(value))
-    assert np.mean((found - expected) ** 2) < 0.07**2 * np.mean(expected**2)
+        assert [dr.grad(x)[0] for x in parameters] == pytest.approx(expected, rel=1e-7)

@@ -151,9 +151,6 @@ def over_normals(
     nodes are even around a whole ring, and dense at the ends of an arc, where ``f`` has a kink. If ``towards`` is the
     more grazing of two directions (`by_grazing`), what is reciprocal, or independent of the azimuth, stays so. Both
     numbers of nodes are even; ``captured`` is that of `integrate`.
-
-    Derivatives by the distribution are those of D at nodes that stay: if they moved, the steps and kinks of ``f`` would
-    be lost between them.
     """
     vector: Any = type(towards)
     Float: Any = type(towards.z)
@@ -163,26 +160,23 @@ def over_normals(
     def around(steps: list, u: Any, everything: Any) -> tuple:
         """What the nodes at +-t of a ring add to its mean, for some (sin(t / 2), cos(t / 2))."""
         distribution, towards, captured = everything
-        still = dr.detach(distribution)
-        x, y = still.alpha_u * towards.x, still.alpha_v * towards.y
+        x, y = distribution.alpha_u * towards.x, distribution.alpha_v * towards.y
         along, across = heading(x, y)
-        steepest = still.least_slope(u) * (x * along + y * across)
+        steepest = distribution.least_slope(u) * (x * along + y * across)
         facing = dr.minimum(towards.z / dr.maximum(steepest, TINY), 1)
         square, rest, terms = (1 + facing) / 2, (1 - facing) / 2, []  # sin^2(chi_0 / 2), cos^2
+        root = dr.sqrt(square)
         for sin_t, cos_t in steps:
             sine = square * (sin_t * sin_t)  # sin^2(chi / 2)
             cosine = dr.maximum(rest + square * (cos_t * cos_t), TINY)
-            share = dr.select(cos_t > TURN, dr.sqrt(square / cosine) * cos_t, 1) / azimuths  # dchi / dt
-            sin, cos, once = 2 * dr.sqrt(sine * cosine), 1 - 2 * sine, (sin_t < TURN) | (cos_t < TURN)
+            inverse = dr.rsqrt(cosine)
+            share = dr.select(cos_t > TURN, root * inverse * cos_t, 1) / azimuths  # dchi / dt
+            sin, cos, once = 2 * root * sin_t * cosine * inverse, 1 - 2 * sine, (sin_t < TURN) | (cos_t < TURN)
             for side in (sin,) if once is True else (sin, -sin):
-                (x, y), weight = still.slopes(along * cos - across * side, across * cos + along * side, u)
-                m = vector(x, y, 1)
-                if dr.grad_enabled(distribution):
-                    density = distribution.density(dr.normalize(m))
-                    weight = weight * (density / dr.detach(density))
+                (x, y), weight = distribution.slopes(along * cos - across * side, across * cos + along * side, u)
                 if dr.is_array_v(once):  # of two nodes that are one, half
                     weight = dr.select(once, weight / 2, weight)
-                terms.append([share * weight * value for value in f(m, captured)])
+                terms.append([share * weight * value for value in f(vector(x, y, 1), captured)])
         return tuple(map(sum, zip(*terms)))
 
     everything = (distribution, towards, captured)
