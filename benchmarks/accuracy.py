@@ -1,6 +1,6 @@
 """Errors of value and density, for 10^5 random inputs of each kind of material; or how two versions of the code differ.
 
-    python benchmarks/accuracy.py --exact                       # against `references`: some minutes
+    python benchmarks/accuracy.py --exact                       # against `exact.py`: some minutes
     python benchmarks/accuracy.py --save before.npz             # in one version
     python benchmarks/accuracy.py --against before.npz          # in another
 
@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import asperity  # noqa: F401  isort: skip
 import mitsuba as mi
 import numpy as np
-from references import REFERENCES
+from exact import REFERENCES
 from rich.console import Console
 from rich.table import Table
 
@@ -120,7 +120,7 @@ def results(kind: str, materials: int) -> np.ndarray:
 
 
 def exact(kind: str, materials: int) -> np.ndarray:
-    """The same by `references`."""
+    """The same by `exact.py`."""
     return np.stack([REFERENCES[given["type"]](given, wi, wo) for given, wi, wo in inputs(kind, materials)])
 
 

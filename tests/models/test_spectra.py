@@ -24,7 +24,7 @@ COLOURS = {
     "tinted metal": ({"type": "micrograin", "edge_tint": 0.3}, "reflectivity"),
     "edge tint": ({"type": "micrograin", "reflectivity": 0.6}, "edge_tint"),
     "tinted grooves": ({"type": "vgroove", "edge_tint": 0.3}, "reflectivity"),
-    "soft grooves": ({"type": "vgroove", "symmetric": False}, "reflectivity"),
+    "soft grooves": ({"type": "vgroove", "symmetric": False, "alpha_u": 0.3, "alpha_v": 0.31}, "reflectivity"),
     "deon": ({"type": "deon"}, "reflectivity"),
     "merillou": ({"type": "merillou"}, "reflectivity"),
     "lambertsphere": ({"type": "lambertsphere"}, "reflectance"),

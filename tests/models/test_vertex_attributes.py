@@ -54,11 +54,14 @@ def run(code, variant):
 
 @pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
 def test_vertices_give_what_constants_give(variant):
-    """With the same samples, hence to rounding; by default, V-grooves would follow more bounces of vertices."""
+    """With the same samples, hence to rounding, and to the fits that constants have: .03 % of V-grooves.
+
+    By default, these would follow more bounces of vertices.
+    """
     code = ""
     for bsdf, value, name in CASES.values():
         constant = value if isinstance(value, float) else {"type": "rgb", "value": value}
         code += f"print(*picture({bsdf % f'vertex({name!r})'}, {name}={value!r}), *picture({bsdf % repr(constant)}))\n"
     vertices, constants = run(code, variant).reshape(-1, 2, 3).swapaxes(0, 1)
-    np.testing.assert_allclose(vertices, constants, rtol=1e-4)
+    np.testing.assert_allclose(vertices, constants, rtol=5e-4)
     assert (constants > 0.05).all()

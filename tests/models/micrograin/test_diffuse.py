@@ -20,7 +20,7 @@ from asperity.models.micrograin.shadows import Shadows
 def reference(monkeypatch):
     """`lambertian` in double precision, by many nodes: that of the benchmarks."""
     monkeypatch.syspath_prepend(Path(__file__).parents[3] / "benchmarks")
-    return importlib.import_module("references").lambertian
+    return importlib.import_module("exact").lambertian
 
 
 FACETS = {

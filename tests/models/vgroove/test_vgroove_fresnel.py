@@ -50,8 +50,8 @@ def test_two_bounces_by_their_mean():
 @pytest.mark.parametrize("count, accuracy", [(6, 4e-3), (8, 1e-3), (12, 2e-4), (30, 1e-5)])
 def test_long_paths(rgb, count, accuracy):
     """Against the sum of gold's ln F, fitted: the less bounces, the farther apart, and the coarser the rule."""
-    metal = mi.load_dict({"type": "vgroove", "material": "Au"}).model.metal.settled()
-    logarithm, rng, n = fresnel.fit_constant(metal)[0], np.random.default_rng(1), 2000
+    fits = mi.load_dict({"type": "vgroove", "material": "Au"}).model.fits
+    logarithm, rng, n = fits.result[0], np.random.default_rng(1), 2000
     x, y = rng.uniform(0, 0.5, (2, n))
     b, length = (np.pi - x - y) / (2 * count), 0.9
     exact = [0, 0, 0]
