@@ -110,16 +110,17 @@ def angle(cos: Any, sin: Any) -> Any:
 
 def exp_of_negative(x: Any) -> Any:
     """exp(x) for x <= 0, to 4e-6 of itself above -3 and 2e-6 of 1 everywhere: Taylor's series at x / 32."""
-    y = greater(x * (1 / 32), -0.75)
-    power = polynomial(y, (1, 1, 1 / 2, 1 / 6, 1 / 24))
-    for _ in range(5):
-        power = power * power
-    return power
+    return _exp_by_squares(greater(x * (1 / 32), -0.75), 5)
 
 
 def exp_of_moderate(x: Any) -> Any:
     """exp(x) for x in [-2.5, 2.5], to 1.6e-5 of itself, and 3e-6 in [-1.5, 1.5]: Taylor's series at x / 16."""
-    power = polynomial(x * (1 / 16), (1, 1, 1 / 2, 1 / 6, 1 / 24))
-    for _ in range(4):
+    return _exp_by_squares(x * (1 / 16), 4)
+
+
+def _exp_by_squares(x: Any, squares: int) -> Any:
+    """exp(2^squares x) for small x."""
+    power = polynomial(x, (1, 1, 1 / 2, 1 / 6, 1 / 24))
+    for _ in range(squares):
         power = power * power
     return power
