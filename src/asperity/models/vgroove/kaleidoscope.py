@@ -92,7 +92,8 @@ def bounces(groove: Groove, psi: Any, offset: Any, most: Any) -> Any:
 def entrance(groove: Groove, psi: Any, u: Any) -> tuple[Any, Any]:
     """(offset, swap): a ray's offset from the apex, uniform over the opening, and whether the ray meets R first.
 
-    R is L of the mirrored groove, in which the ray's angle is -psi. ``u`` is in [0, 1).
+    R is L of the mirrored groove, in which the ray's angle is -psi. ``u`` is in [0, 1). With `bounces` and `exit_angle`
+    it is what the closed ways of rays, which models draw, are tested against.
     """
     left = dr.cos(psi - groove.tilt_l) / dr.maximum(dr.sin(groove.tilt_l), 1e-6)
     right = dr.cos(psi + groove.tilt_r) / dr.maximum(dr.sin(groove.tilt_r), 1e-6)
