@@ -14,13 +14,17 @@ from typing import Any
 DOCS = Path(__file__).parent
 FOLDER = "generated"
 THUMBNAILS = DOCS / "pictures" / "gallery"
+OTHERS = "Mitsuba's own"
+"""Presets without a model of ours, to compare with."""
 
 
 def gallery() -> str:
     """All presets, by model: thumbnail, what it is, its command, its description."""
+    from asperity.models import MODELS
     from asperity.scenes import presets
 
-    found = sorted((presets.load(name) for name in presets.names()), key=model_of)
+    order = [*MODELS, OTHERS]
+    found = sorted((presets.load(name) for name in presets.names()), key=lambda preset: order.index(model_of(preset)))
     parts = [
         "# Gallery",
         f"The {len(found)} presets, by the model that makes them. `asperity list` prints them, `asperity show NAME` "
@@ -29,7 +33,12 @@ def gallery() -> str:
     ]
     for model, group in groupby(found, model_of):
         members = list(group)
-        parts += [f"## {model}", ":::{container} gallery", *map(thumbnail, members), ":::"]
+        parts += [
+            f"## {f'`{model}`' if model in MODELS else model}",
+            ":::{container} gallery",
+            *map(thumbnail, members),
+            ":::",
+        ]
         parts += map(entry, members)
     return "\n\n".join(parts)
 
@@ -42,19 +51,18 @@ def model_of(preset: Any) -> str:
         inner = [name for value in node.values() if isinstance(value, dict) for name in types(value)]
         return [node.get("type", ""), *inner]
 
-    return next((name for name in types(preset.material) if name in MODELS), "Mitsuba's own")
+    return next((name for name in types(preset.material) if name in MODELS), OTHERS)
 
 
 def thumbnail(preset: Any) -> str:
     """A preset's picture with its name below, a link to its entry; the name alone where there is no picture."""
-    picture = picture_of(preset.name)
-    return f"[{f'![{preset.title}]({picture})' if picture else ''} {preset.name}](#preset-{preset.name})"
+    return f"[{picture(preset)} {preset.name}](#preset-{preset.name})"
 
 
-def picture_of(name: str) -> str | None:
-    """The path of a preset's thumbnail from the generated pages, if it was made."""
-    found = sorted(THUMBNAILS.glob(f"{name}.*"))
-    return f"../{found[0].relative_to(DOCS).as_posix()}" if found else None
+def picture(preset: Any) -> str:
+    """The thumbnail of a preset, if it was made."""
+    found = sorted(THUMBNAILS.glob(f"{preset.name}.*"))
+    return f"![{preset.title}](../{found[0].relative_to(DOCS).as_posix()})" if found else ""
 
 
 def entry(preset: Any) -> str:
