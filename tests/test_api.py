@@ -157,6 +157,13 @@ def test_presets():
     assert found["gilded"].description["type"] == "micrograin" and len(found) >= 40
 
 
+@pytest.mark.parametrize("materials", [[GREY], [GREY, "gilded"]])
+def test_plots(rgb, materials, tmp_path):
+    figure = asp.plot(*materials, view="slices", theta=[30])
+    figure.savefig(tmp_path / "slices.png")
+    assert len(figure.axes[0].lines) >= len(materials)
+
+
 class Lambert(LobeModel):
     """A model of one's own."""
 
@@ -189,7 +196,7 @@ def test_a_model_of_ones_own(rgb, monkeypatch):
 
 def test_a_report(rgb, tmp_path, monkeypatch):
     section = validation.Section("one", "text", [])
-    monkeypatch.setitem(validation.PAPERS, "vgroove", lambda effort: iter([section]))
+    monkeypatch.setitem(validation.PAPERS, "vgroove", {"one": lambda effort: section})
     assert asp.validate("vgroove", tmp_path / "report", quick=True).passed
     assert "--quick" in (tmp_path / "report" / "report.md").read_text()
 
@@ -220,6 +227,9 @@ BAD = {
     "horizontal": (lambda: asp.measure("vgroove", 90), "theta = 90"),
     "size": (lambda: asp.render(GREY, size=0), "width = 0: expected a whole number"),
     "object": (lambda: asp.render(GREY, object="pwan"), "Did you mean 'pawn'"),
+    "view": (lambda: asp.plot(GREY, view="lobe"), "Did you mean 'lobes'"),
+    "nothing": (lambda: asp.plot(), "expected at least one"),
+    "option": (lambda: asp.plot(GREY, theta_i=[3]), "theta_i: makes no sense with view lobes"),
     "paper": (lambda: asp.validate("vgrove", "nowhere"), "Did you mean 'vgroove'"),
     "no model": (lambda: asp.register(int), "expected a class derived from asperity.lobes.LobeModel"),
     "our name": (lambda: asp.register(Lambert, "vgroove"), "name = 'vgroove': there is such a plugin already"),

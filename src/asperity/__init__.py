@@ -16,7 +16,7 @@ from .errors import AsperityError, ParameterError, UnknownNameError, UnreadableF
 from .version import __version__
 
 if TYPE_CHECKING:
-    from .api import albedo, check, evaluate, material, measure, pdf, presets, register, render, sample, validate
+    from .api import albedo, check, evaluate, material, measure, pdf, plot, presets, register, render, sample, validate
 
 LAZY = (
     "evaluate",
@@ -27,6 +27,7 @@ LAZY = (
     "measure",
     "validate",
     "render",
+    "plot",
     "presets",
     "material",
     "register",
@@ -46,6 +47,7 @@ __all__ = [
     "material",
     "measure",
     "pdf",
+    "plot",
     "presets",
     "register",
     "render",

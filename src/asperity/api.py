@@ -23,9 +23,10 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from . import goniophotometer, loading, models, plugin, validation
+from . import drawing, goniophotometer, loading, models, plugin, validation
 from .arrays import CHUNK, Array, Directions, mapped
 from .errors import ParameterError, refuse_unused
 from .goniophotometer.mesh import MESHES
@@ -227,6 +228,16 @@ def render(
     return Picture(np.array(mi.render(scene, spp=spp, seed=seed), dtype=np.float32))
 
 
+def plot(*materials: Any, view: str = "lobes", **options: Any) -> Figure:
+    """A figure of one or several materials, for its ``savefig``; ``view`` and ``options`` are those of `drawing.plot`.
+
+    In spectral variants, or where the option ``wavelengths`` asks for one, at these wavelengths.
+    """
+    active = _ensure_variant()
+    with _variant(_arrays(active, options.get("wavelengths") is not None)):
+        return drawing.plot([resolve(material) for material in materials], view, **options)
+
+
 def presets() -> dict[str, Material]:
     """All presets by name, each a `Material`: its ``description`` is a dictionary for ``mi.load_dict``."""
     return {name: resolve(name) for name in _presets.names()}
@@ -288,19 +299,29 @@ def _loaded(material: Any, wavelengths: Sequence[float] | None = None, colourles
 
     In a spectral variant these have to be, unless what is asked for is ``colourless``.
     """
-    active = _ensure_variant()
-    wanted = active.replace("scalar_", "llvm_ad_")
-    if wavelengths is not None and "spectral" not in wanted:
-        wanted = f"{wanted.partition('_')[0]}_ad_spectral"
-    found = resolve(material)
-    try:
-        if wanted != active:
-            mi.set_variant(wanted)
+    found, active = resolve(material), _ensure_variant()
+    with _variant(_arrays(active, wavelengths is not None)):
         channels = dr.size_v(mi.UnpolarizedSpectrum)
         chosen = _wavelengths(wavelengths, channels if colourless else 0)
         groups: list[Any] = [_filled(chosen[k : k + channels], channels) for k in range(0, len(chosen), channels)]
         theta = (0.0, 90.0) if found.measured is None else tuple(found.measured.incident[[0, -1], 0])
         yield _Loaded(found.name, found.load(), groups or [None], len(chosen) or channels, theta)
+
+
+def _arrays(variant: str, wavelengths: bool) -> str:
+    """The variant like this one that computes arrays, and wavelengths, if they are asked for."""
+    found = variant.replace("scalar_", "llvm_ad_")
+    return f"{found.partition('_')[0]}_ad_spectral" if wavelengths and "spectral" not in found else found
+
+
+@contextmanager
+def _variant(wanted: str) -> Iterator[None]:
+    """That variant, for a while."""
+    active = mi.variant()
+    try:
+        if wanted != active:
+            mi.set_variant(wanted)
+        yield
     finally:
         if wanted != active:
             mi.set_variant(active)
