@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity import models, validation
+from asperity import validation
 from asperity.goniophotometer import Hemisphere
 from asperity.lab import evaluate
 from asperity.lobes import ByCosine, LobeModel, diffuse
@@ -177,9 +177,7 @@ class Lambert(LobeModel):
         return [ByCosine(lambda wi, wo: albedo / dr.pi)]
 
 
-def test_a_model_of_ones_own(rgb, monkeypatch):
-    monkeypatch.setattr(models, "MODELS", dict(models.MODELS))
-    monkeypatch.setattr("asperity.plugin.MODELS", models.MODELS)
+def test_a_model_of_ones_own(rgb, registry):
     assert asp.register(Lambert) is Lambert
     for variant in ("llvm_ad_rgb", "llvm_ad_mono"):
         mi.set_variant(variant)
