@@ -15,7 +15,7 @@ STEEP = 20
 """A peak so many times the median of its curve is drawn with logarithms, if nothing is said."""
 
 
-def slices(
+def figure(
     materials: Sequence[Any],
     *,
     theta: Sequence[float] | None = None,
