@@ -45,10 +45,10 @@ def compare(
         shown = resolve(first), resolve(second, settings or [])
         variants.choose(variant or plot.suited(shown))
         from asperity import drawing
-        from asperity.lab.compare import compare as compare_bsdfs
+        from asperity.drawing import comparison
 
         names = drawing.distinct_names(shown)
-        found = compare_bsdfs(shown[0].load(), shown[1].load(), names)
+        found = comparison.compare(*shown, names)
     rendered = previews(*shown) if preview else None
     with console.status("drawing"):
         drawing.style.save(drawing.compared(*shown, found, rendered), path)
@@ -80,7 +80,10 @@ def report(names: list[str], found: Comparison, numbers: dict[str, Any]) -> None
     where = "θ_i = {:.0f}°, φ_i = {:.0f}°; θ_o = {:.1f}°, φ_o = {:.1f}°".format(*worst.incident, *worst.outgoing)
     at = numbers["albedo_largest_difference_theta"]
     table = Table(f"{names[1]} against {names[0]}", "", "where")
-    table.add_row("mean relative error", share(numbers["mean_relative_error"]), "all directions, by solid angle")
+    over = "all directions, by solid angle" if found.error is None else "all that was measured"
+    table.add_row("mean relative error", share(numbers["mean_relative_error"]), over)
+    if numbers["of_it_noise"] is not None:
+        table.add_row("of it, noise", share(numbers["of_it_noise"]), "of what was measured")
     table.add_row("worst relative error", share(numbers["worst_relative_error"]), where)
     table.add_row("log-cosine error, RMS", f"{numbers['log_cosine_rms']:.4g}", "as Löw et al. 2012")
     table.add_row("albedo, largest difference", f"{numbers['albedo_largest_difference']:+.4f}", f"θ_i = {at:g}°")

@@ -33,7 +33,7 @@ VIEWS: dict[str, Callable[..., Figure]] = {
     "sampling": sampling.figure,
 }
 """Each takes materials and options by name, and gives a figure; the first line of its docstring says what it shows."""
-MEASURED = ("lobes", "slices", "hemisphere", "albedo")
+MEASURED = ("lobes", "slices", "hemisphere", "albedo", "comparison")
 """Views that draw what was measured itself; the others draw a BSDF that interpolates it."""
 ALL_LIGHT = ("albedo", "comparison")
 """Where mirrors are seen, too."""
@@ -67,10 +67,7 @@ def plot(materials: Sequence[Material], view: str = "lobes", **options: Any) -> 
 
 
 def compared(a: Material, b: Material, found: Comparison, previews: Previews | None = None) -> Figure:
-    """A figure of two materials side by side, ``a`` the reference, with what `lab.compare.compare` found of them.
-
-    A measurement is drawn as the BSDF that interpolates it.
-    """
+    """A figure of two materials side by side, ``a`` the reference, with what `comparison.compare` found of them."""
     names = distinct_names([a, b])
     with style.applied():
         shown = [_loaded(replace(one, name=name), "comparison") for one, name in zip((a, b), names)]

@@ -10,16 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from asperity.goniophotometer import against
+from asperity.lab import compare as lab_compare
 from asperity.lab.compare import FAINT, Comparison
 
 from . import curves, hemisphere, slices, style, values
 
-ANGLE = 45.0
-"""Of incidence, of the maps, in degrees."""
-RELATIVE = 0.5
-"""Relative difference at the ends of the scale."""
 ANGLES = (0.0, 30.0, 60.0)
-"""Of incidence, of the slices."""
+"""Of incidence, in degrees; the second is that of the maps. Of measurements, they are among what was measured."""
 
 
 class Previews(NamedTuple):
@@ -31,30 +29,44 @@ class Previews(NamedTuple):
     flip: np.ndarray | None
 
 
+def compare(a: Any, b: Any, names: Sequence[str]) -> Comparison:
+    """Compare two materials, the first of which is the reference; a measurement, in its own directions.
+
+    Raises ParameterError if that makes no sense.
+    """
+    if a.measured is not None:
+        return against.against(a.measured, b.load() if b.measured is None else b.measured)
+    if b.measured is not None:
+        return against.swapped(against.against(b.measured, a.load()))
+    return lab_compare.compare(a.load(), b.load(), names)
+
+
 def figure(materials: Sequence[Any], found: Comparison, previews: Previews | None = None) -> Figure:
-    """A figure of two loaded materials, the first of which is the reference, and of what `lab.compare` found."""
+    """A figure of two loaded materials, the first of which is the reference, and of what `compare` found."""
+    incident = values.incidence(materials, None, float(found.incident[0, 1]), ANGLES, most=len(ANGLES))
     heights = [2.15, 2.2] + [1.85] * (previews is not None)
     made = style.figure(style.PAGE, sum(heights))
     parts = made.subfigures(len(heights), 1, height_ratios=heights)
-    maps(materials, parts[0].subplots(1, 3))
-    slices_and_albedo(materials, found, parts[1])
+    maps(materials, incident[len(incident) // 2], parts[0].subplots(1, 3))
+    slices_and_albedo(materials, found, incident, parts[1])
     if previews is not None:
         pictures(materials, previews, parts[2])
     return made
 
 
-def maps(materials: Sequence[Any], places: np.ndarray) -> None:
+def maps(materials: Sequence[Any], incident: np.ndarray, places: np.ndarray) -> None:
     """Fill three axes: f cos θo of both, and the relative difference."""
-    incident = np.array([[ANGLE, 0.0]])
-    a, b = (hemisphere.over_disc(material, incident).mean(axis=0)[0] for material in materials)
+    a, b = (hemisphere.over_disc(material, incident[None]).mean(axis=0)[0] for material in materials)
     norm = style.norm([a, b], "log")
     for axes, material, map in zip(places, materials, (a, b)):
-        image = hemisphere.disc(axes, map, norm, incident[0])
-        axes.set_title(rf"{material.name}, {style.THETA_I} = {ANGLE:g}°")
+        image = hemisphere.disc(axes, map, norm, incident)
+        axes.set_title(rf"{material.name}, {style.THETA_I} = {incident[0]:g}°")
     with np.errstate(invalid="ignore", divide="ignore"):
-        relative = np.where(a == b, 0, (b - a) / np.maximum(a, FAINT * np.nanmean(a)))
-    relative[np.isnan(a)] = np.nan
-    errors = hemisphere.disc(places[2], relative, Normalize(-RELATIVE, RELATIVE), incident[0], style.DIFFERENCES)
+        relative = (b - a) / np.maximum(a, FAINT * np.nanmean(a))
+    relative[a == b] = 0
+    sizes = np.abs(relative[np.isfinite(relative)])
+    end = float(np.clip(np.quantile(sizes, 0.95), 0.01, 1)) if len(sizes) else 1.0
+    errors = hemisphere.disc(places[2], relative, Normalize(-end, end), incident, style.DIFFERENCES)
     places[2].set_title("relative difference")
     hemisphere.name_marks(places[0])
     look = {"fraction": 0.05, "pad": 0.02, "shrink": 0.85}
@@ -63,13 +75,12 @@ def maps(materials: Sequence[Any], places: np.ndarray) -> None:
     made.colorbar(errors, ax=places[2:], label="second / first - 1", extend="both", **look)
 
 
-def slices_and_albedo(materials: Sequence[Any], found: Comparison, figure: Any) -> None:
+def slices_and_albedo(materials: Sequence[Any], found: Comparison, incident: np.ndarray, figure: Any) -> None:
     """Fill a row: slices in the plane of incidence, and the albedos."""
     names = [material.name for material in materials]
-    incident = np.array([(angle, 0.0) for angle in ANGLES])
     planes = [values.in_plane(material, incident) for material in materials]
-    panels = curves.arrange(names, [rf"{style.THETA_I} = {angle:g}°" for angle in ANGLES], [("", None)])
-    places = figure.subplots(1, 4)
+    panels = curves.arrange(names, [rf"{style.THETA_I} = {angle:g}°" for angle, _ in incident], [("", None)])
+    places = figure.subplots(1, len(panels) + 1)
     scale = slices.suited([curve.value for plane in planes for curve in plane])
     for axes, panel in zip(places, panels):
         for line in panel.lines:
@@ -78,13 +89,13 @@ def slices_and_albedo(materials: Sequence[Any], found: Comparison, figure: Any) 
         axes.set(title=panel.title, xlabel=rf"{style.THETA_O} [°]", xticks=(-90, 0, 90))
         if axes is not places[0]:
             axes.set_ylabel("")
+    last, order = places[-1], np.argsort(found.theta)
+    few = "o" if len(order) <= curves.FEW // 2 else ""
     for line, albedo in zip(panels[0].lines, (found.albedo_a, found.albedo_b)):
-        places[3].plot(found.theta, albedo.mean(axis=0), **line.look)
+        last.plot(found.theta[order], albedo.mean(axis=0)[order], few + "-", markersize=3, **line.look)
     top = max(found.albedo_a.max(), found.albedo_b.max())
-    places[3].set(
-        title="directional albedo", xlabel=rf"{style.THETA_I} [°]", xticks=(0, 30, 60, 90), ylim=(0, 1.05 * top)
-    )
-    places[3].grid()
+    last.set(title="albedo", xlabel=rf"{style.THETA_I} [°]", xticks=(0, 30, 60, 90), ylim=(0, 1.05 * top or 1))
+    last.grid()
     style.legend(figure, places)
 
 

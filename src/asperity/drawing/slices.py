@@ -45,7 +45,8 @@ def figure(
 
 def suited(found: Sequence[np.ndarray]) -> str:
     """The scale on which values (channels, n) are seen."""
-    return "log" if any(0 < STEEP * np.median(value[value > 0]) < value.max() for value in found) else "linear"
+    lit = [value[value > 0] for value in found if (value > 0).any()]
+    return "log" if any(STEEP * np.median(value) < value.max() for value in lit) else "linear"
 
 
 def finish(axes: Axes, scale: str, cosine: bool) -> None:

@@ -61,7 +61,7 @@ def figure(measured: Measurement, model: dict[str, Any] | None = None) -> Figure
     ``model`` is the description of a BSDF to draw as well; it needs a variant with the measurement's channels.
     """
     if model is not None:
-        _check_channels(measured)
+        check_channels(measured)
         measured = replace(measured, about=measured.about | {"model": model})  # lines are named by it
     several = len(np.unique(measured.incident[:, 0])) > 1
     heights = [3.4] * len(measured.incident) + [3.0] * several
@@ -288,7 +288,7 @@ def model_means(measured: Measurement, k: int, bsdf: Any, cells: np.ndarray, wei
     return (means * weights).sum(axis=-1).T
 
 
-def _check_channels(measured: Measurement) -> None:
+def check_channels(measured: Measurement) -> None:
     """Raise ParameterError if a model has other channels, in the variant in use, than what was measured."""
     names = measured.channels
     spectral, count = measured.wavelengths is not None, dr.size_v(mi.UnpolarizedSpectrum)

@@ -37,25 +37,31 @@ class Worst(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparison:
-    """Values f |cos θo| of two BSDFs, ``a`` the reference, (channels, incidence, outgoing), and their albedos.
+    """Values f |cos θo| of two materials, ``a`` the reference, (channels, incidence, outgoing), and their albedos.
 
-    All means are over both hemispheres by solid angle, and over channels. Mirrors count in the albedos only.
+    All means are over these directions, which share solid angles evenly, and over channels. Mirrors count in the
+    albedos only.
     """
 
     incident: np.ndarray  # (incidence, 2): θ and φ in degrees
-    outgoing: np.ndarray  # (outgoing, 2)
+    outgoing: np.ndarray  # (incidence, outgoing, 2)
     a: np.ndarray
     b: np.ndarray
     theta: np.ndarray  # degrees, of the albedos
     albedo_a: np.ndarray  # (channels, angles)
     albedo_b: np.ndarray
+    error: np.ndarray | None = None  # standard errors of b - a, if they were measured
+
+    @cached_property
+    def floor(self) -> np.ndarray:
+        """What errors of fainter values are relative to."""
+        return np.maximum(self.a, FAINT * self.a.mean(axis=-1, keepdims=True))
 
     @cached_property
     def relative(self) -> np.ndarray:
         """(b - a) / a; where a is below `FAINT` of its mean over outgoing directions, relative to that; else 0."""
-        floor = FAINT * self.a.mean(axis=-1, keepdims=True)
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = (self.b - self.a) / np.maximum(self.a, floor)
+            found = (self.b - self.a) / self.floor
         return np.where(self.b == self.a, 0.0, found)
 
     @property
@@ -64,11 +70,19 @@ class Comparison:
         return float(np.abs(self.relative).mean())
 
     @property
+    def noise(self) -> float | None:
+        """What `mean_relative` would be if nothing but noise of the measurement told a and b apart; None without any.
+
+        The mean of |x| of a normal distribution is sqrt(2 / π) times its standard deviation.
+        """
+        return None if self.error is None else float(np.sqrt(2 / np.pi) * (self.error / self.floor).mean())
+
+    @property
     def worst(self) -> Worst:
         """Where |b - a| / a is largest."""
         error = np.abs(self.relative)
         _, i, o = np.unravel_index(error.argmax(), error.shape)
-        return Worst(float(error.max()), tuple(self.incident[i].tolist()), tuple(self.outgoing[o].tolist()))
+        return Worst(float(error.max()), tuple(self.incident[i].tolist()), tuple(self.outgoing[i, o].tolist()))
 
     @property
     def albedo_difference(self) -> np.ndarray:
@@ -86,6 +100,7 @@ class Comparison:
         largest = int(np.abs(difference).argmax())
         numbers = {
             "mean_relative_error": self.mean_relative,
+            "of_it_noise": self.noise,
             "worst_relative_error": worst.error,
             "worst_incident": worst.incident,
             "worst_outgoing": worst.outgoing,
@@ -119,6 +134,7 @@ def compare(a: mi.BSDF, b: mi.BSDF, names: Sequence[str] = ("a", "b")) -> Compar
             raise ParameterError(f"{name} is not finite at {len(wrong)} of {found.size} values, {where}.")
     upright = _directions(grid(THETA, np.zeros(1)))
     albedo_a, albedo_b = (evaluate.albedo(bsdf, upright, SAMPLES) for bsdf in (a, b))
+    outgoing = np.broadcast_to(outgoing, (len(wi), *outgoing.shape))
     return Comparison(incident, outgoing, of_a, of_b, THETA, albedo_a, albedo_b)
 
 
