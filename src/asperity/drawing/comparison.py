@@ -47,23 +47,21 @@ def figure(materials: Sequence[Any], found: Comparison, previews: Previews | Non
     heights = [2.15, 2.2] + [1.85] * (previews is not None)
     made = style.figure(style.PAGE, sum(heights))
     parts = made.subfigures(len(heights), 1, height_ratios=heights)
-    maps(materials, incident[len(incident) // 2], parts[0].subplots(1, 3))
+    maps(materials, found, incident[len(incident) // 2], parts[0].subplots(1, 3))
     slices_and_albedo(materials, found, incident, parts[1])
     if previews is not None:
         pictures(materials, previews, parts[2])
     return made
 
 
-def maps(materials: Sequence[Any], incident: np.ndarray, places: np.ndarray) -> None:
+def maps(materials: Sequence[Any], found: Comparison, incident: np.ndarray, places: np.ndarray) -> None:
     """Fill three axes: f cos θo of both, and the relative difference."""
     a, b = (hemisphere.over_disc(material, incident[None]).mean(axis=0)[0] for material in materials)
     norm = style.norm([a, b], "log")
     for axes, material, map in zip(places, materials, (a, b)):
         image = hemisphere.disc(axes, map, norm, incident)
         axes.set_title(rf"{material.name}, {style.THETA_I} = {incident[0]:g}°")
-    with np.errstate(invalid="ignore", divide="ignore"):
-        relative = (b - a) / np.maximum(a, FAINT * np.nanmean(a))
-    relative[a == b] = 0
+    relative = relative_map(materials, found, incident, a, b)
     sizes = np.abs(relative[np.isfinite(relative)])
     end = float(np.clip(np.quantile(sizes, 0.95), 0.01, 1)) if len(sizes) else 1.0
     errors = hemisphere.disc(places[2], relative, Normalize(-end, end), incident, style.DIFFERENCES)
@@ -73,6 +71,24 @@ def maps(materials: Sequence[Any], incident: np.ndarray, places: np.ndarray) -> 
     made = places[0].figure
     made.colorbar(image, ax=places[:2], label=style.quantity(True), **look)
     made.colorbar(errors, ax=places[2:], label="second / first - 1", extend="both", **look)
+
+
+def relative_map(
+    materials: Sequence[Any], found: Comparison, incident: np.ndarray, a: np.ndarray, b: np.ndarray
+) -> np.ndarray:
+    """b / a - 1 of the maps; where it was measured, of means over the same cells."""
+    for material in materials:
+        if material.measured is not None:
+            sensor, k = material.measured.sensor, values.row(material, tuple(incident))
+            of_cells = found.relative[:, k].mean(axis=0)
+            wo, relative = hemisphere.pixels(), np.full_like(a, np.nan)
+            inside = wo[..., 2] > 0
+            relative[inside] = of_cells[hemisphere.cells(wo[inside], sensor.rows, sensor.columns)]
+            return relative
+    with np.errstate(invalid="ignore", divide="ignore"):
+        relative = (b - a) / np.maximum(a, FAINT * np.nanmean(a))
+    relative[a == b] = 0
+    return relative
 
 
 def slices_and_albedo(materials: Sequence[Any], found: Comparison, incident: np.ndarray, figure: Any) -> None:
