@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import LogLocator
 
 from ..errors import ParameterError
 from ..lab import evaluate
@@ -98,9 +99,8 @@ def overview(measured: Measurement, bsdf: Any) -> Figure:
         with np.errstate(invalid="ignore", divide="ignore"):
             beside, name, norm, colours = 100 * error / value, ERROR, LogNorm(0.1, 100), "magma"
     else:
-        means = np.stack(
-            [model_means(measured, k, bsdf, *each(sensor), COARSE).mean(axis=-1) for k in range(len(value))]
-        )
+        found = [model_means(measured, k, bsdf, *each(sensor), COARSE) for k in range(len(value))]
+        means = np.stack(found).mean(axis=-1)
         with np.errstate(invalid="ignore", divide="ignore"):
             beside, name, norm, colours = 100 * (means / value - 1), OFF, Normalize(-50, 50), "RdBu_r"
     figure = Figure(figsize=(13, 11), dpi=150, layout="constrained")
@@ -129,14 +129,16 @@ def mosaic(axes: Axes, measured: Measurement, pictures: list[np.ndarray], norm: 
         if not tabular:
             name = f"{measured.incident[k, 0]:.3g}°, {measured.incident[k, 1]:.3g}°"
             axes.text(x, y, name, fontsize=4, va="bottom")
-    image = axes.imshow(canvas, norm=norm, cmap=colours, interpolation="nearest", aspect="auto")
+    image = axes.imshow(canvas, norm=norm, cmap=colours, interpolation="nearest")
     axes.spines[:].set_visible(False)
     axes.set(xticks=[], yticks=[])
     if tabular:
         axes.set_xticks((np.arange(len(phi)) + 0.5) * width - 1, [f"{angle:.3g}°" for angle in phi], fontsize=7)
         axes.set_yticks((np.arange(len(theta)) + 0.5) * height - 1, [f"{angle:.3g}°" for angle in theta], fontsize=7)
         axes.set(xlabel=r"$\phi_i$", ylabel=r"$\theta_i$")
-    axes.figure.colorbar(image, ax=axes, label=label, location="top", shrink=0.9, extend="both")
+    ticks = {"ticks": LogLocator(10, (1, 2, 5)), "format": "%.3g"} if isinstance(norm, LogNorm) else {}
+    bar = axes.figure.colorbar(image, ax=axes, label=label, location="top", shrink=0.9, extend="both", **ticks)
+    bar.ax.minorticks_off()
 
 
 @singledispatch
