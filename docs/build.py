@@ -14,12 +14,27 @@ from textwrap import fill
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- parameters: made by docs/build.py -->", "<!-- end of parameters -->"
 BEGIN_SPEED, END_SPEED = "<!-- speed: made by docs/build.py -->", "<!-- end of speed -->"
+BEGIN_KEPT, END_KEPT = "<!-- kept: made by docs/build.py -->", "<!-- end of kept -->"
 SPEED = DOCS / "speed.json"
 CALLS, FRAMES = ("eval_pdf", "sample"), ("bare", "preview", "filled")
 """Columns of `speed.json`: nanoseconds, and seconds."""
 MACBETH = {"orange": (214, 126, 44), "blue flower": (133, 128, 177), "bluish green": (103, 189, 170)}
 """Patches of the ColorChecker, as its maker gives them: sRGB of 8 bits."""
 INDICES = (1.0, 1.2, 1.33, 1.5)
+WHITE = {"type": "rgb", "value": 1.0}
+PAINT = {"type": "interfacedlambertian", "diffuse_reflectance": WHITE}
+GRAINS = {"type": "micrograin", "tau_0": 0.5, "base": {"type": "diffuse", "reflectance": WHITE}}
+KEPT = (
+    ("`roughconductor`", {"type": "roughconductor", "distribution": "ggx", "material": "none"}, "alpha"),
+    ("`vgroove`", {"type": "vgroove", "material": "none"}, "alpha"),
+    ("`roughplastic`, nonlinear", {"type": "roughplastic", "nonlinear": True, "diffuse_reflectance": WHITE}, "alpha"),
+    ("`interfacedlambertian`", PAINT, "alpha"),
+    ("the same, `scattering: multiple`", {**PAINT, "scattering": "multiple", "masking": "vcavity"}, "alpha"),
+    ("`micrograin`, mirrors on white, tau_0 .5", GRAINS, "beta"),
+    ("the same, `scattering: multiple`", {**GRAINS, "scattering": "multiple"}, "beta"),
+)
+"""White materials, and the parameter that makes them rough."""
+ROUGHNESSES, TILTS = (0.1, 0.3, 0.6, 1.0), (1.0, 60.0)
 STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", "dirty-weave")
 
 
@@ -70,6 +85,32 @@ def spread(quartiles: list[float]) -> str:
 def with_speed(page: str, name: str, report: dict) -> str:
     """The page with the speed of the model ``name`` between the marks, if it has marks."""
     return between(page, BEGIN_SPEED, speed_table(name, report), END_SPEED) if BEGIN_SPEED in page else page
+
+
+def kept() -> list[list[float]]:
+    """Albedos of the white materials, by angle of incidence and roughness."""
+    import mitsuba as mi
+
+    from asperity.lab import evaluate
+    from asperity.lab.checks.samples import SAMPLES, draw_samples
+
+    mi.set_variant("llvm_ad_rgb")
+
+    def albedo(description: dict, theta: float) -> float:
+        drawn = draw_samples(evaluate.load(description), evaluate.direction(theta, 0), SAMPLES, seed=1)
+        return float(drawn.weight.mean())
+
+    return [
+        [albedo({**white, rough: value}, theta) for theta in TILTS for value in ROUGHNESSES] for _, white, rough in KEPT
+    ]
+
+
+def kept_table() -> str:
+    """The same in Markdown."""
+    heads = [f"{theta:.0f}°, {value:g}" for theta in TILTS for value in ROUGHNESSES]
+    lines = ["| | " + " | ".join(heads) + " |", "|" + "---|" * (len(heads) + 1)]
+    lines += [f"| {name} | " + " | ".join(f"{x:.2f}" for x in row) + " |" for (name, *_), row in zip(KEPT, kept())]
+    return "\n".join(lines)
 
 
 def strip(path: Path, size: int = 256, spp: int = 256) -> None:
@@ -150,6 +191,8 @@ def main() -> None:
     for name, model in MODELS.items():
         page = DOCS / f"{name}.md"
         page.write_text(with_speed(with_table(page.read_text(), model), name, report))
+    page = DOCS / "which.md"
+    page.write_text(between(page.read_text(), BEGIN_KEPT, kept_table(), END_KEPT))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         figures(DOCS / "pictures")

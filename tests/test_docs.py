@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -42,6 +43,13 @@ def test_speed_tables_are_those_of_the_benchmark(name):
 def test_all_models_that_were_timed_have_a_table_of_speed():
     timed = {row.split(",")[0] for row in json.loads(build.SPEED.read_text())["rows"]} & models().keys()
     assert timed == {name for name, page in PAGES.items() if build.BEGIN_SPEED in page}
+
+
+@pytest.mark.slow
+def test_light_that_is_kept_is_what_the_page_says():
+    """Two digits are printed; the means of the samples have standard errors of .001."""
+    rows = re.findall(r"^\| .*? \| ([\d. |]+) \|$", PAGES["which"].split(build.BEGIN_KEPT)[1], re.MULTILINE)
+    assert np.allclose([[float(x) for x in row.split("|")] for row in rows], build.kept(), rtol=0, atol=0.01)
 
 
 def test_readme_begins_with_a_picture_and_two_commands():

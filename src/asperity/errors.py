@@ -17,10 +17,10 @@ class ParameterError(AsperityError):
 
 
 class UnknownNameError(AsperityError):
-    """A name outside the allowed ones."""
+    """A name outside the allowed ones; ``hint`` is what to say of them if they are too many to be told."""
 
-    def __init__(self, what: str, given: str, allowed: Collection[str]):
-        super().__init__(f"unknown {what} {given!r}. {suggestion(given, allowed)}")
+    def __init__(self, what: str, given: str, allowed: Collection[str], hint: str = ""):
+        super().__init__(f"unknown {what} {given!r}. {nearest(given, allowed)}{hint or listed(allowed)}")
 
 
 class UnreadableFileError(AsperityError):
@@ -32,9 +32,18 @@ class UnreadableFileError(AsperityError):
 
 def suggestion(given: str, allowed: Collection[str]) -> str:
     """The nearest of the allowed names, where one is near, and all of them."""
-    nearest = difflib.get_close_matches(given, allowed, n=1, cutoff=0.5)
-    hint = f"Did you mean {nearest[0]!r}? " if nearest else ""
-    return f"{hint}Allowed: {', '.join(allowed)}."
+    return nearest(given, allowed) + listed(allowed)
+
+
+def nearest(given: str, allowed: Collection[str]) -> str:
+    """A question whether the nearest of the allowed names was meant, and a space; nothing if none is near."""
+    found = difflib.get_close_matches(given, allowed, n=1, cutoff=0.5)
+    return f"Did you mean {found[0]!r}? " if found else ""
+
+
+def listed(allowed: Collection[str]) -> str:
+    """The allowed names."""
+    return f"Allowed: {', '.join(allowed)}."
 
 
 def refuse_unused(options: Mapping[str, Any], used: Collection[str], what: str) -> None:

@@ -1,6 +1,8 @@
 """`dr.freeze`: what a model is made of is found, and takes part in what was recorded."""
 
 import asperity  # noqa: F401  isort: skip
+import gc
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -8,6 +10,16 @@ import pytest
 from helpers import directions
 
 from asperity.models import MODELS
+
+
+@pytest.fixture(autouse=True)
+def collected():
+    """A scene that Python's collector frees while a frozen function records aborts the process (Dr.Jit 1.5).
+
+    Errors keep scenes, in circles of their own.
+    """
+    gc.collect()
+
 
 BASE = {"type": "diffuse"}
 CASES = {  # description, and a parameter to move

@@ -111,13 +111,10 @@ SPREAD = {
 KNOWN = {
     ("interfacedlambertian", "textured"): {"bounds"},
     ("interfacedlambertian", "multiple"): {"bounds"},
-    ("vgroove", "non-symmetric"): {"variants"},
-    ("vgroove", "non-symmetric beckmann"): {"variants"},
 }
 """Checks that fail, as the models' pages say. Derivatives by a textured alpha are those of a table that is linear
 between roughnesses, and jump from one cell to the next; those of light that is mirrored into a cavity, at grazing
-angles, are of a sum over steps, and jump by 1.5 % of all at alpha 1.5 (bound: 1 %). Grooves of independent tilts are
-tabulated in compiled RGB and mono variants alone: .1 % of the largest value from others' quadrature (bound: 1e-4)."""
+angles, are of a sum over steps, and jump by 1.5 % of all at alpha 1.5 (bound: 1 %)."""
 QUICK = {"micrograin-gold", "vgroove-gold", "merillou-tiles", "deon-dense", "orennayar-default"}
 QUICK |= {"lambertsphere-default", "chandrasekhar-default", "interfacedlambertian-default", "twoscale-gold"}
 CASES = [

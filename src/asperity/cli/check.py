@@ -11,6 +11,7 @@ from rich.text import Text
 
 from asperity.errors import ParameterError
 from asperity.files import atomically
+from asperity.materials import resolve
 
 from . import console, materials, output, variants
 
@@ -18,7 +19,9 @@ VERDICT = {True: ("passed", "green"), False: ("failed", "bold red"), None: ("ski
 
 
 def check(
-    target: Annotated[str | None, typer.Argument(metavar="BSDF", help="A BSDF: ours, Mitsuba's or yours.")] = None,
+    target: Annotated[
+        str | None, typer.Argument(metavar="MATERIAL", help="A preset, a BSDF (ours, Mitsuba's, yours), a file, JSON.")
+    ] = None,
     settings: materials.Settings = None,
     preset: materials.PresetName = None,
     material: materials.MaterialFile = None,
@@ -32,13 +35,7 @@ def check(
 ) -> None:
     """Check a BSDF: sampling, reciprocity, energy, gradients and more. The exit code is 1 if a check fails."""
     if sum(way is not None for way in (target, preset, material)) != 1:
-        raise ParameterError("give one of: the name of a BSDF, --preset, --material.")
-    name = target or preset or material.stem  # type: ignore[union-attr]
-    description: dict[str, Any] = {"type": target}
-    if target:
-        materials.apply(description, settings or [])
-    else:
-        description = materials.chosen(preset, material, settings).material
+        raise ParameterError("give one of: a material, --preset, --material.")
     with console.status("loading"):
         from asperity.lab import checks
         from asperity.lab import plugins as own
@@ -46,17 +43,20 @@ def check(
         for path in plugins or []:
             own.load(path)
         variants.choose(variant)
-        materials.check_material(description)
+        chosen = resolve(target or preset or material, settings or [])
+        bsdf = chosen.load()
 
     names = [checks.canonical(check) for check in only or checks.NAMES]
     with console.progress("checks") as progress:
         task = progress.add_task("", total=len(names))
         results = checks.check(
-            description, lambda name, done, _: progress.update(task, description=name, completed=done), names
+            chosen.description or bsdf,
+            lambda name, done, _: progress.update(task, description=name, completed=done),
+            names,
         )
     report(results)
     failures = [result for result in results if result.passed is False]
-    write_pictures(failures, name, pictures)
+    write_pictures(failures, chosen.name, pictures)
     raise typer.Exit(1 if failures else 0)
 
 

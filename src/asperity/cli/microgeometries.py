@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import typer
 
 from asperity.errors import ParameterError, UnknownNameError, refuse_unused
+from asperity.materials import resolve
 
 from . import materials
 
@@ -51,12 +52,11 @@ class Wanted(NamedTuple):
     def _description(self) -> dict[str, Any]:
         """That of the model, checked."""
         if self.target is None:
-            description = materials.chosen(self.preset, self.material, self.settings).material
+            found = materials.chosen(self.preset, self.material, self.settings)
         else:
-            description = {"type": self.target}
-            materials.apply(description, self.settings or [])
-        materials.check_material(description)
-        return description
+            found = resolve({"type": self.target}, self.settings or [])
+        found.load()
+        return found.description or {}  # a measurement has none, and no microgeometry
 
     def _from_file(self) -> Microgeometry:
         """The mesh or height field; says how the latter was made periodic."""
@@ -81,5 +81,5 @@ def facets(text: str) -> dict[str, Any]:
         raise ParameterError(f"--bsdf {text}: no JSON; column {error.colno}: {error.msg}.") from error
     if not (isinstance(description, dict) and "type" in description):
         raise ParameterError(f'--bsdf {text}: expected an object in braces, such as {{"type": "diffuse"}}.')
-    materials.check_material(description)
+    resolve(description).load()
     return description

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from asperity.errors import ParameterError
+from asperity.materials import resolve
 
 from . import channels, console, materials, output, passes, scene_files, variants
 
@@ -49,7 +50,7 @@ def render(
     object_: Annotated[str | None, typer.Option("--object", help="pawn, knot, sphere, or a mesh file.")] = None,
     env: Annotated[str | None, typer.Option(help="studio, venice, workshop, sky, constant, or a map.")] = None,
     compare: Annotated[
-        str | None, typer.Option(metavar="PRESET", help="Show another beside, and the difference.")
+        str | None, typer.Option(metavar="MATERIAL", help="Show another beside, and the difference.")
     ] = None,
     crease: Annotated[
         float | None, typer.Option(metavar="DEGREES", help="Smooth the faces of a mesh file that meet at up to this.")
@@ -110,9 +111,8 @@ def previews(given: dict[str, Any], size: tuple[int, int]) -> list[Any]:
     """The preview scene with the given material, and perhaps the same scene with the one to compare with."""
     shown = [materials.chosen(given.get("preset"), given.get("material"), given.get("set"))]
     if "compare" in given:
-        shown.append(materials.chosen(given["compare"], None, None))
-    for one in shown:
-        materials.check_material(one.material)
+        shown.append(resolve(given["compare"]))
+    bsdfs = [one.load() for one in shown]
     view = shown[0].preview | {name: given[name] for name in ("object", "env", "crease") if name in given}
 
     import mitsuba as mi
@@ -120,7 +120,10 @@ def previews(given: dict[str, Any], size: tuple[int, int]) -> list[Any]:
     from asperity.scenes.preview import preview
 
     with warnings.catch_warnings(record=True) as warned:
-        scenes = [mi.load_dict(preview(one.material, size=size, **view), parallel=False) for one in shown]
+        scenes = [
+            mi.load_dict(preview(one.description or bsdf, size=size, **view), parallel=False)
+            for one, bsdf in zip(shown, bsdfs)
+        ]
     for message in dict.fromkeys(str(warning.message) for warning in warned):
         typer.echo(f"warning: {message}", err=True)
     return scenes

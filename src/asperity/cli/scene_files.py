@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import ParameterError, UnreadableFileError, readable
-
-from .materials import value
+from asperity.materials import value
 
 FORMATS = (".xml", ".json")
 NAME = r"[A-Za-z_]\w*"

@@ -137,6 +137,11 @@ def native(value: Any) -> Any:
     return value if dr.is_jit_v(mi.Float) else float(dr.detach(value).numpy().item())
 
 
+def tables_work() -> bool:
+    """Whether tables can be made: in scalar variants, too, LLVM computes them."""
+    return dr.is_jit_v(mi.Float) or llvm.complaint() is None
+
+
 def array_types(user: str) -> tuple[Any, Any]:
     """Numbers and vectors to make tables with: the variant's own, or LLVM's where that is scalar.
 

@@ -48,15 +48,19 @@ def read(path: str | Path) -> Preset:
     """
     path = readable("material", path, FORMATS)
     try:
-        content = json.loads(path.read_bytes(), object_pairs_hook=_distinct)  # any UTF, and its byte order mark
-        return _preset(path, content)
+        return parse(path.read_bytes(), path)
+    except (OSError, ValueError) as error:
+        raise UnreadableFileError("material", path, FORMATS, str(error)) from error
+
+
+def parse(text: str | bytes, path: Path) -> Preset:
+    """What `read` reads, from JSON (in any UTF) of a file that lies, or might lie, at ``path``; raises ValueError."""
+    try:
+        return _preset(path, json.loads(text, object_pairs_hook=_distinct))
     except json.JSONDecodeError as error:
-        reason = f"line {error.lineno}, column {error.colno}: {error.msg}"
+        raise ValueError(f"line {error.lineno}, column {error.colno}: {error.msg}") from error
     except RecursionError:
-        reason = "it is nested too deep"
-    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or one of our own
-        reason = str(error)
-    raise UnreadableFileError("material", path, FORMATS, reason)
+        raise ValueError("it is nested too deep") from None
 
 
 def _preset(path: Path, content: Any) -> Preset:

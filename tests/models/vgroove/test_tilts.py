@@ -1,6 +1,7 @@
 """Tilts of partners: their normalisation, and their samples."""
 
 import asperity  # noqa: F401  isort: skip
+import drjit as dr
 import drjit.llvm.ad as llvm
 import numpy as np
 import pytest
@@ -38,3 +39,13 @@ def test_shares_of_partners(kind, alpha):
     single = kind(llvm.Float(alpha)).partners(llvm.Float(np.float32(np.sin(a))), llvm.Float(np.float32(np.cos(a))))
     assert np.asarray(single[0]) == pytest.approx(below, abs=1e-4)
     assert np.asarray(single[1]) == pytest.approx(beyond, abs=1e-4 * beyond[0])
+
+
+@pytest.mark.parametrize("kind", TILTS.values())
+def test_derivatives_of_level_and_steep_facets_are_finite(kind):
+    """Backwards, where the infinite slope of a root would meet a factor of 0."""
+    alpha = llvm.Float(0.5)
+    dr.enable_grad(alpha)
+    flatter, beyond = kind(alpha).partners(llvm.Float(0, 1e-20, 1), llvm.Float(1, 1, 0))
+    dr.backward(dr.sum(0.3 * flatter + 0.7 * beyond))  # whole factors leave exact zeros, which hide it
+    assert np.isfinite(dr.grad(alpha)[0])

@@ -18,7 +18,7 @@ from ...lobes import Lobe, LobeModel, glossy
 from ...microfacet.distributions import DISTRIBUTIONS, Distribution
 from ...microfacet.numerics import clamp
 from ...microfacet.sampling import direction, more_numbers
-from ...microfacet.tables import Made
+from ...microfacet.tables import Made, tables_work
 from ...parameters import Axes, Choice, Flag, Integer, Texture, Usual, conflict, numbers, settled
 from .bounces import MOST, needed_bounces, needed_bounces_nonsymmetric
 from .fresnel import Reflectance, fit, fit_constant
@@ -163,7 +163,7 @@ class VGroove(LobeModel):
         """Make the table, anew if something changed, where there is one: else quadrature takes its place."""
         roughness = self.exponent if self.alpha is None else self.alpha.textures.get("alpha")
         constant = roughness is not None and settled(roughness) and (self.metal.mirror or self.fits.result is not None)
-        alpha = self._roughest() if constant and dr.is_jit_v(mi.Float) and not self.symmetric else None
+        alpha = self._roughest() if constant and tables_work() and not self.symmetric else None
         if alpha is None or alpha > TABULATED:
             self.table.clear()
             return

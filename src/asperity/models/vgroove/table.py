@@ -23,7 +23,7 @@ import numpy as np
 
 from ...microfacet.distributions import Distribution
 from ...microfacet.fast import greater, lesser, reciprocals
-from ...microfacet.tables import Table
+from ...microfacet.tables import Table, array_types, native
 from .fresnel import Reflectance
 from .kaleidoscope import Pair
 from .nonsymmetric import several, single_bounce
@@ -90,20 +90,25 @@ class Tabulated:
     @classmethod
     def of(cls, distribution: type[Distribution], alpha: float, most: int, logarithm: list | None) -> Tabulated:
         """For at most so many bounces, and what is None or the ``logarithm`` of a `Reflectance`."""
-        tilts = TILTS[distribution](dr.opaque(mi.Float, alpha))
-        bounces, layout = dr.opaque(mi.UInt32, most), Layout(tilts.alpha)
+        Float, Vector = array_types("symmetric")
+        UInt = dr.uint32_array_t(Float)
+        tilts, bounces = TILTS[distribution](dr.opaque(Float, alpha)), dr.opaque(UInt, most)
+        layout = Layout(tilts.alpha)
         pair = _pairs(layout, alpha, ANGLES)
         total = several(pair, tilts, bounces, None, FINE)[1] / (_horizons(pair) * pair.cos_delta * tilts.partner())
         mirrors, metal = Table.of(ANGLES, [_fourth_root(total)]), None
         if logarithm is not None:
             pair = _pairs(layout, alpha, COLOURS)
+            if not dr.is_jit_v(mi.Float):  # plain numbers
+                spectrum = Vector if dr.size_v(logarithm[0]) == 3 else Float
+                logarithm = [spectrum(*coefficient) for coefficient in logarithm]
             reflectance = Reflectance(lambda cos: 1, logarithm)
             colour, total = several(pair, tilts, bounces, reflectance, COARSE, each=True)
             channels = [_fourth_root(channel / greater(total, 1e-30)) for channel in colour]
             dr.eval(channels)
             channels = [_straddled(channel, COLOURS[-1]) for channel in channels]
             metal = Table.of(COLOURS, channels + channels[:1] * (len(channels) == 3))  # of four, read at once
-        return cls(layout, mirrors, metal)
+        return cls(Layout(native(tilts.alpha)), mirrors.native(), metal and metal.native())
 
     def __call__(
         self, pair: Pair, cos_i: Any, tilts: Tilts, most: Any, reflectance: Reflectance | None
@@ -123,21 +128,22 @@ class Tabulated:
 
 def _pairs(layout: Layout, alpha: float, shape: tuple) -> Pair:
     """The nodes of a table over theta, delta and, perhaps, the root of l; but for edges, a little inside."""
-    index = dr.arange(mi.UInt32, math.prod(shape))
+    Float: Any = type(layout.alpha)
+    index = dr.arange(dr.uint32_array_t(Float), math.prod(shape))
     columns, depth = shape[1], math.prod(shape[2:])
     nodes = Layout(alpha).theta(np.minimum(np.linspace(0, 1, shape[0]), 1 - EDGE / shape[0]))
     nodes = np.minimum(nodes, HALF - 10 * INSIDE)
-    theta = dr.gather(mi.Float, mi.Float(nodes.astype(np.float32)), index // (columns * depth))
-    y = mi.Float(index // depth % columns) / (columns - 1)
+    theta = dr.gather(Float, Float(nodes.astype(np.float32)), index // (columns * depth))
+    y = Float(index // depth % columns) / (columns - 1)
     delta = lesser(layout.delta(dr.minimum(y, 1 - EDGE / columns), theta), HALF - theta - INSIDE)
-    length = dr.square(mi.Float(index % depth) / (depth - 1)) if depth > 1 else mi.Float(1)
+    length = dr.square(Float(index % depth) / (depth - 1)) if depth > 1 else Float(1)
     (sin, cos), (sin_delta, cos_delta) = dr.sincos(theta), dr.sincos(delta)
-    return Pair(mi.Float(1), mi.Float(0), theta, sin, cos, delta, sin_delta, cos_delta, length)
+    return Pair(Float(1), Float(0), theta, sin, cos, delta, sin_delta, cos_delta, length)
 
 
 def _straddled(values: Any, nodes: int) -> Any:
     """Values at nodes of the last axis, moved so that a curve is on both sides of its chords: half the error."""
-    index = dr.arange(mi.UInt32, dr.width(values))
+    index = dr.arange(dr.uint32_array_t(type(values)), dr.width(values))
     inner = (index % nodes > 0) & (index % nodes < nodes - 1)
     before, after = (dr.gather(type(values), values, at, inner) for at in (index - 1, index + 1))
     return values - dr.select(inner, before - 2 * values + after, 0) / 16

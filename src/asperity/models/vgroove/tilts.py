@@ -184,7 +184,7 @@ class PhongTilts(Tilts):
         inverse = dr.rcp(n + 3.5)
         log_cos = dr.select(sin < 0.5, log1p(-dr.square(lesser(sin, 0.5))) / 2, dr.log(greater(cos, TINY)))
         square = lesser(-(n + 3.5) * log_cos, 36)
-        z, gauss = dr.sqrt(square), dr.exp(-square)
+        z, gauss = dr.sqrt(greater(square, TINY)), dr.exp(-square)  # the root of 0 has no finite derivative
         third, fifth = (gamma * dr.square(inverse) ** power for power, gamma in enumerate(GAMMAS[:2], 1))
         terms = [1 / math.gamma(power + 1.5) for power in range(1, 5)]  # of Z^(2 power + 1) exp(-Z^2)
         longer = polynomial(square, terms[:2]) * third + polynomial(square, terms) * fifth
