@@ -80,5 +80,7 @@ def _drawable(material: Material, view: str) -> Material:
     if view == "albedo" or not mi.has_flag(flags, mi.BSDFFlags.Delta):
         return material
     if not mi.has_flag(flags, mi.BSDFFlags.Smooth):
-        raise ParameterError(f"{material.name} is all mirror, or clear glass: its values are 0, and view albedo shows it.")
+        raise ParameterError(
+            f"{material.name} is all mirror, or clear glass: its values are 0, and view albedo shows it."
+        )
     return replace(material, name=f"{material.name} without its mirror")

@@ -38,7 +38,9 @@ def albedo(
     panel = curves.arrange([material.name for material in materials], [""], channels)[0]
     for line in panel.lines:
         material = materials[line.material]
-        look = line.look | {"label": ("all" if line.channel is None else line.look["label"]) if single else line.look["label"]}
+        look = line.look | {
+            "label": ("all" if line.channel is None else line.look["label"]) if single else line.look["label"]
+        }
         if single:
             look["color"] = "black"
         curves.draw(axes, over_incidence(material, phi, wavelengths), line._replace(look=look))

@@ -115,9 +115,7 @@ def cells(wo: np.ndarray, rows: int, columns: int) -> np.ndarray:
     return row * columns + np.minimum((turn * columns).astype(int), columns - 1)
 
 
-def disc(
-    axes: Axes, map: np.ndarray, norm: Normalize, incident: np.ndarray, colours: str = style.MAP
-) -> Any:
+def disc(axes: Axes, map: np.ndarray, norm: Normalize, incident: np.ndarray, colours: str = style.MAP) -> Any:
     """Draw a map (SIZE, SIZE) with what helps to read it; returns the image."""
     map = style.visible(map, norm)
     image = axes.imshow(map, origin="lower", extent=(-1, 1, -1, 1), norm=norm, cmap=colours, interpolation="bilinear")

@@ -49,7 +49,9 @@ def lobe3d(
 def mesh(theta: float, phi: float) -> np.ndarray:
     """Directions (rings, sectors, 3) over the hemisphere, closed in azimuth, closer about the mirrored one."""
     fine = np.arange(-NEAR, NEAR + FINE / 2, FINE)
-    rings = np.unique(np.clip(np.concatenate([np.arange(0, 90, STEP), [values.HORIZON], theta + fine]), 0, values.HORIZON))
+    rings = np.unique(
+        np.clip(np.concatenate([np.arange(0, 90, STEP), [values.HORIZON], theta + fine]), 0, values.HORIZON)
+    )
     turn = np.unique(np.concatenate([np.arange(-180, 181, STEP), fine]))
     t, p = np.meshgrid(rings, turn + phi + 180, indexing="ij")
     return directions(np.stack([t.ravel(), p.ravel()], axis=1)).reshape(*t.shape, 3)

@@ -65,7 +65,9 @@ def _check_variant(wavelengths: Sequence[float] | None) -> None:
     if not dr.is_jit_v(mi.Float):
         raise ParameterError(f"variant {variant}: pictures need one that computes on arrays, such as llvm_ad_rgb.")
     if wavelengths is not None and not mi.is_spectral:
-        raise ParameterError(f"wavelengths: variant {variant} has none. Choose a spectral one, such as llvm_ad_spectral.")
+        raise ParameterError(
+            f"wavelengths: variant {variant} has none. Choose a spectral one, such as llvm_ad_spectral."
+        )
     for wavelength in wavelengths or ():
         if not mi.MI_CIE_MIN <= wavelength <= mi.MI_CIE_MAX:
             raise ParameterError(f"wavelength = {wavelength:g}: expected nm in [{mi.MI_CIE_MIN:g}, {mi.MI_CIE_MAX:g}].")

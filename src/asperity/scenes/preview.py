@@ -64,6 +64,7 @@ def preview(
     seed: int = 0,
     integrator: Description | None = None,
     crease: float | None = None,
+    turn: float = 0.0,
 ) -> Description:
     """Description, for the current variant, of a scene that shows ``material`` on an object.
 
@@ -71,6 +72,7 @@ def preview(
     light is exposed but keeps its colour, and z is up. ``light``, one of LIGHTS, dims it and puts lamps there: from
     the front means from behind the camera. ``floor`` is one of FLOORS. ``integrator`` replaces the path tracer.
     ``crease`` is the angle in degrees up to which the faces of a mesh file are smoothed; see `meshes.from_file`.
+    ``turn``, in degrees, turns the object counterclockwise, seen from above.
     """
     return {
         "type": "scene",
@@ -80,19 +82,21 @@ def preview(
         "ground": ground(floor),
         "environment": environment(env, 1.0 if light is None else ROOM),
         **lamps(light),
-        "object": shown(object, material, crease),
+        "object": shown(object, material, crease, turn),
     }
 
 
-def shown(name: str | Path, material: Description, crease: float | None = None) -> Any:
+def shown(name: str | Path, material: Description | mi.BSDF, crease: float | None = None, turn: float = 0.0) -> Any:
     """The object, as a shape."""
     if isinstance(name, str) and name in OBJECTS:
         if crease is not None:
             raise ParameterError(f"crease = {crease}: the {name} has normals of its own. It is for mesh files.")
-        return meshes.to_mitsuba(OBJECTS[name](), material)
-    if isinstance(name, (str, Path)) and Path(name).suffix:
-        return meshes.to_mitsuba(meshes.from_file(name, crease), material)
-    raise UnknownNameError("object", str(name), [*OBJECTS, *(f"FILE{suffix}" for suffix in meshes.FORMATS)])
+        mesh = OBJECTS[name]()
+    elif isinstance(name, (str, Path)) and Path(name).suffix:
+        mesh = meshes.from_file(name, crease)
+    else:
+        raise UnknownNameError("object", str(name), [*OBJECTS, *(f"FILE{suffix}" for suffix in meshes.FORMATS)])
+    return meshes.to_mitsuba(meshes.turned(mesh, turn), material)
 
 
 def camera(size: tuple[int, int], spp: int, seed: int) -> Description:
