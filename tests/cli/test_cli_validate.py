@@ -2,6 +2,7 @@
 
 import inspect
 import signal
+from functools import partial
 
 import mitsuba as mi
 import pytest
@@ -13,13 +14,12 @@ from asperity.validation.report import Effort, Finding, Section
 def paper(*verdicts, interrupt=False):
     """Sections of one claim each; Ctrl-C comes while the first is measured."""
 
-    def sections(effort):
-        for n, passed in enumerate(verdicts):
-            if interrupt and n == 0:
-                signal.raise_signal(signal.SIGINT)
-            yield Section(f"section {n}", "", [Finding(f"claim {n}", f"{effort.paths:g}", "", passed)])
+    def section(n, passed, effort):
+        if interrupt and n == 0:
+            signal.raise_signal(signal.SIGINT)
+        return Section(f"section {n}", "", [Finding(f"claim {n}", f"{effort.paths:g}", "", passed)])
 
-    return sections
+    return {str(n): partial(section, n, passed) for n, passed in enumerate(verdicts)}
 
 
 @pytest.mark.parametrize(("verdicts", "code"), [((True, None), 0), ((True, False), 1)])
@@ -64,17 +64,16 @@ def test_reports_are_not_overwritten(asperity, tmp_path, monkeypatch):
 def test_a_section_that_is_interrupted_is_left_out(asperity, tmp_path, monkeypatch, end):
     """Long before it would be done, and what was done before it is there even if it fails."""
 
-    def sections(effort):
-        yield Section("first", "", [Finding("claim", "1", "1", True)])
-        assert "first" in (tmp_path / "report" / "report.md").read_text()
-        yield endless(effort)
+    def first(effort):
+        return Section("first", "", [Finding("claim", "1", "1", True)])
 
     def endless(effort):
+        assert "first" in (tmp_path / "report" / "report.md").read_text()
         signal.raise_signal(end)
         while True:
             effort.tick()
 
-    monkeypatch.setitem(validation.PAPERS, "micrograin", sections)
+    monkeypatch.setitem(validation.PAPERS, "micrograin", {"first": first, "endless": endless})
     result = asperity("validate", "micrograin", "-o", "report")
     text = (tmp_path / "report" / "report.md").read_text()
     assert result.exit_code == 1 and "Stopped early" in result.output and "Stopped early" in text and "first" in text

@@ -11,12 +11,14 @@ from asperity.validation.report import Finding, Section
 def paper(monkeypatch):
     """Two sections; the second does not come if somebody wants to stop."""
 
-    def sections(effort):
-        yield Section("first", f"{effort.paths:g} paths, seed {effort.seed}", [Finding("claim", "1", "2", True)])
-        effort.tick()
-        yield Section("second", "", [Finding("claim", "3", "2", False)])
+    def first(effort):
+        return Section("first", f"{effort.paths:g} paths, seed {effort.seed}", [Finding("claim", "1", "2", True)])
 
-    monkeypatch.setitem(validation.PAPERS, "micrograin", sections)
+    def second(effort):
+        effort.tick()
+        return Section("second", "", [Finding("claim", "3", "2", False)])
+
+    monkeypatch.setitem(validation.PAPERS, "micrograin", {"first": first, "second": second})
 
 
 @pytest.mark.parametrize(("quick", "paths"), [(True, "400000 paths"), (False, "4e+06 paths")])

@@ -9,7 +9,7 @@ import typer
 
 from asperity import __version__
 
-from . import check, cite, doctor, list, measure, merge, plot, render, show, validate
+from . import check, cite, doctor, list, measure, merge, plot, render, reproduce, show, validate
 from .errors import OneLineErrors
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -22,6 +22,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "plot": plot.plot,
     "merge": merge.merge,
     "validate": validate.validate,
+    "reproduce": reproduce.reproduce,
     "doctor": doctor.doctor,
 }
 """In the order of the help."""

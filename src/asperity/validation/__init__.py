@@ -3,7 +3,7 @@
 >>> validate("micrograin", "report", quick=True).passed
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,17 +11,20 @@ from ..errors import UnknownNameError
 from . import interfacedlambertian, lambertsphere, micrograin, twoscale, vgroove
 from .report import FULL, QUICK, Effort, Report, Section
 
-PAPERS: dict[str, Callable[[Effort], Iterator[Section]]] = {
-    "micrograin": micrograin.sections,
-    "vgroove": vgroove.sections,
-    "lambertsphere": lambertsphere.sections,
-    "interfacedlambertian": interfacedlambertian.sections,
-    "twoscale": twoscale.sections,
+Sections = dict[str, Callable[[Effort], Section]]
+"""What makes the sections of a report, by short names, in their order."""
+
+PAPERS: dict[str, Sections] = {
+    "micrograin": micrograin.SECTIONS,
+    "vgroove": vgroove.SECTIONS,
+    "lambertsphere": lambertsphere.SECTIONS,
+    "interfacedlambertian": interfacedlambertian.SECTIONS,
+    "twoscale": twoscale.SECTIONS,
 }
-"""What makes the sections of a model's report, by the model's name."""
+"""The reports, by the model's name."""
 
 
-def paper(model: str) -> Callable[[Effort], Iterator[Section]]:
+def paper(model: str) -> Sections:
     """What makes the sections of a model's report; raises UnknownNameError if there is none."""
     if model not in PAPERS:
         raise UnknownNameError("model with a validation", model, PAPERS)
@@ -30,6 +33,16 @@ def paper(model: str) -> Callable[[Effort], Iterator[Section]]:
 
 class StoppedError(Exception):
     """Somebody wants to stop; what is being measured is left out."""
+
+
+def efforts(quick: bool, seed: int, stop: Callable[[], bool]) -> Effort:
+    """How long to measure; it ends by StoppedError as soon as ``stop()`` is true."""
+
+    def tick(*_: object) -> None:
+        if stop():
+            raise StoppedError
+
+    return (QUICK if quick else FULL)._replace(seed=seed, tick=tick)
 
 
 def validate(
@@ -52,19 +65,14 @@ def validate(
     stop() : asked every second or so; True ends the report with the sections that are done
     done(section) : called after each section
     """
-    sections = paper(model)
-
-    def tick(*_: object) -> None:
-        if stop():
-            raise StoppedError
-
-    effort = (QUICK if quick else FULL)._replace(seed=seed, tick=tick)
+    sections, effort = paper(model), efforts(quick, seed, stop)
     report = Report(model, effort, Path(folder), quick)
     with suppress(StoppedError):
-        for section in sections(effort):
+        for make in sections.values():
+            section = make(effort)
             report.add(section)
             done(section)
-            tick()
+            effort.tick()
         report.finished = True
     report.close()
     return report

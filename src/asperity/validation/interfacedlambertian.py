@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -76,13 +76,6 @@ SURFACES = (
     Surface("gaussian", 1.0, multiple=None),
     Surface("beckmann", (0.2, 0.8)),
 )
-
-
-def sections(effort: Effort) -> Iterator[Section]:
-    """The report, section by section, as it is measured."""
-    yield reflectance(effort)
-    yield by_bounce(effort)
-    yield curves(effort)
 
 
 def paint(distribution: str, alpha: Any, n: float = 1.5, albedo: tuple[float, ...] = ALBEDOS) -> dict[str, Any]:
@@ -367,3 +360,11 @@ def diagrams(title: str, drawn: dict[tuple, dict[str, np.ndarray]], dashed: str)
             axes.semilogy(OUTGOING, lines[dashed], "--", color=colours[kind], linewidth=0.9)
         axes.set_title(f"index {n:g}, σ {alpha:g}", fontsize=8)
     return figure
+
+
+SECTIONS: dict[str, Callable[[Effort], Section]] = {
+    "reflectance": reflectance,
+    "bounces": by_bounce,
+    "curves": curves,
+}
+"""The report, section by section, in its order."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -41,17 +41,6 @@ SHEET: dict[str, dict[str, Any]] = {
 def spheres(albedo: float, **others: Any) -> dict[str, Any]:
     """A scene's description of the model."""
     return {"type": "lambertsphere", "albedo": albedo} | others
-
-
-def sections(effort: Effort) -> Iterator[Section]:
-    """The report, section by section, as it is measured."""
-    yield phase_function(effort)
-    yield brdf(effort)
-    yield energy(effort)
-    yield explicit(effort)
-    yield slab(effort)
-    yield ball(effort)
-    yield sheet(effort)
 
 
 def phase_function(effort: Effort) -> Section:
@@ -341,3 +330,15 @@ def sheet(effort: Effort, size: int = 128, spp: int = 64) -> Section:
         "Lambertian spheres are flat in front light, like the full moon, and brighter than Lambert's law at the edge.",
         figures={"sheet": figure},
     )
+
+
+SECTIONS: dict[str, Callable[[Effort], Section]] = {
+    "phase": phase_function,
+    "brdf": brdf,
+    "energy": energy,
+    "explicit": explicit,
+    "slab": slab,
+    "ball": ball,
+    "sheet": sheet,
+}
+"""The report, section by section, in its order."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -74,20 +75,6 @@ def judge(claim: str, measured: Measurement, model: np.ndarray, tolerance: float
     truth = Estimate(*(np.concatenate([a[..., 0], b[:, :1]], axis=1) for a, b in zip(cells, albedo)))
     total = model.sum(axis=1, keepdims=True) * measured.sensor.solid_angle
     return agreement(claim, truth, np.concatenate([model, total], axis=1), len(measured.labels), tolerance)
-
-
-def sections(effort: Effort) -> Iterator[Section]:
-    """The report, section by section, as it is measured."""
-    yield masking_by_azimuth(effort)
-    yield distant_masking(effort)
-    yield pores(effort)
-    yield slices("7", "conductor", METAL, INSTRUMENT, effort)
-    yield slices("8", "diffuse", DIFFUSE, QUADRATURE, effort)
-    yield bases(effort)
-    yield models(effort)
-    yield retro(effort)
-    yield furnace(effort)
-    yield multiple(effort)
 
 
 # --- masking ---------------------------------------------------------------------------------------------------------
@@ -418,3 +405,18 @@ def multiple(effort: Effort) -> Section:
         ],
         [Table(("grains", "F", "R", "traced", "`multiple`", "`single`", "error of `multiple`"), rows)],
     )
+
+
+SECTIONS: dict[str, Callable[[Effort], Section]] = {
+    "masking": masking_by_azimuth,
+    "distant": distant_masking,
+    "pores": pores,
+    "conductors": partial(slices, "7", "conductor", METAL, INSTRUMENT),
+    "diffuse": partial(slices, "8", "diffuse", DIFFUSE, QUADRATURE),
+    "bases": bases,
+    "models": models,
+    "retro": retro,
+    "furnace": furnace,
+    "multiple": multiple,
+}
+"""The report, section by section, in its order."""

@@ -29,6 +29,11 @@ class Finding:
     bound: str = ""
     passed: bool | None = None
 
+    @property
+    def verdict(self) -> str:
+        """In a word."""
+        return {True: "passed", False: "**failed**", None: ""}[self.passed]
+
 
 @dataclass(frozen=True)
 class Table:
@@ -36,6 +41,16 @@ class Table:
 
     head: Sequence[str]
     rows: Sequence[Sequence[Any]]
+
+    def in_words(self) -> Table:
+        """The same with numbers as they are printed."""
+        return Table([_cell(cell) for cell in self.head], [[_cell(cell) for cell in row] for row in self.rows])
+
+    def markdown(self) -> str:
+        """The table in Markdown."""
+        words = self.in_words()
+        rows = [words.head, ["---"] * len(words.head), *words.rows]
+        return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows)
 
 
 @dataclass(frozen=True)
@@ -151,9 +166,9 @@ def write(title: str, preface: str, sections: Sequence[Section], folder: Path, d
     for k, section in enumerate(sections):
         lines += [f"## {section.title}", section.text]
         if section.findings:
-            rows = [(f.claim, f.measured, f.bound, _verdict(f.passed)) for f in section.findings]
-            lines.append(_markdown(Table(("claim", "measured", "bound", ""), rows)))
-        lines += [_markdown(table) for table in section.tables]
+            rows = [(f.claim, f.measured, f.bound, f.verdict) for f in section.findings]
+            lines.append(Table(("claim", "measured", "bound", ""), rows).markdown())
+        lines += [table.markdown() for table in section.tables]
         for name, figure in section.figures.items():
             if k >= drawn:
                 with atomically(folder / f"{name}.png") as part:
@@ -163,15 +178,6 @@ def write(title: str, preface: str, sections: Sequence[Section], folder: Path, d
     with atomically(report) as part:
         part.write_text("\n\n".join(lines) + "\n", encoding="utf-8")
     return report
-
-
-def _verdict(passed: bool | None) -> str:
-    return {True: "passed", False: "**failed**", None: ""}[passed]
-
-
-def _markdown(table: Table) -> str:
-    rows = [table.head, ["---"] * len(table.head), *table.rows]
-    return "\n".join("| " + " | ".join(map(_cell, row)) + " |" for row in rows)
 
 
 def _cell(value: Any) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import astuple
 from itertools import pairwise
@@ -43,15 +43,6 @@ def reflected(
     context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), component)
     value = mi.unpolarized_spectrum(bsdf.eval(context, si, evaluate.vectors(o)))
     return evaluate.to_numpy(value, len(i))[0] / o[:, 2]
-
-
-def sections(effort: Effort) -> Iterator[Section]:
-    """The report, section by section, as it is measured."""
-    yield heights(effort)
-    yield facet_by_facet(effort)
-    yield tables(effort)
-    yield energy(effort)
-    yield wavelengths(effort)
 
 
 CELLS, WAVES = 256, 64
@@ -580,3 +571,13 @@ def spheres(pictures: dict[str, tuple[np.ndarray, np.ndarray]]) -> Any:
             axes.imshow(np.clip(values, 0, 1) ** (1 / 2.2))
             axes.set_axis_off()
     return figure
+
+
+SECTIONS: dict[str, Callable[[Effort], Section]] = {
+    "heights": heights,
+    "facets": facet_by_facet,
+    "tables": tables,
+    "energy": energy,
+    "wavelengths": wavelengths,
+}
+"""The report, section by section, in its order."""

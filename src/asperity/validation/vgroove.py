@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -41,15 +41,6 @@ TABLE_2 = {
     "ggx": ((3, 4, 5), (4, 5, 7), (8, 12, 16)),
 }
 """Lee 2018, Table 2: rows are 90, 95 and 99 %, columns are alpha .5, .7 and 1."""
-
-
-def sections(effort: Effort) -> Iterator[Section]:
-    """The report, section by section, as it is measured."""
-    yield kaleidoscope(tick=effort.tick)
-    yield brdf_by_bounce(effort)
-    yield nonsymmetric(effort)
-    yield bounces()
-    yield furnace(effort)
 
 
 # --- one groove ------------------------------------------------------------------------------------------------------
@@ -366,3 +357,13 @@ def furnace_spheres(size: int = 128, spp: int = 128, tick: Callable[..., None] =
         axes.set_title(name, fontsize=8)
         axes.set_axis_off()
     return figure
+
+
+SECTIONS: dict[str, Callable[[Effort], Section]] = {
+    "kaleidoscope": lambda effort: kaleidoscope(tick=effort.tick),
+    "bounces": brdf_by_bounce,
+    "nonsymmetric": nonsymmetric,
+    "number": lambda effort: bounces(),
+    "furnace": furnace,
+}
+"""The report, section by section, in its order."""

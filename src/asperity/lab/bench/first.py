@@ -1,0 +1,72 @@
+"""How long a user waits for a first picture, and the memory it takes: in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+SIZE, SPP = 64, 4
+"""Of the picture: nearly all of the time is tracing and compiling."""
+MEBIBYTE = 2**20 if sys.platform == "darwin" else 2**10
+"""In units of the system's ``ru_maxrss``."""
+
+
+class First(NamedTuple):
+    """Seconds until there is a picture, once Python has its modules; those of all threads; and the most memory, MiB."""
+
+    wall: float
+    cpu: float
+    memory: float
+
+
+def first_picture(material: dict[str, Any], variant: str) -> First:
+    """In a new process, whose home is empty, so that Dr.Jit has no kernel yet."""
+    with tempfile.TemporaryDirectory() as home:
+        paths = [str(Path(__file__).parents[3]), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+        done = subprocess.run(
+            [sys.executable, "-m", __name__, variant],
+            env=os.environ | {"HOME": home, "LOCALAPPDATA": home, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
+            input=json.dumps(material),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    if done.returncode:
+        raise RuntimeError(f"no picture of {material.get('type')!r}: {done.stderr.strip()[-400:]}")
+    return First(**json.loads(done.stdout.splitlines()[-1]))
+
+
+def here(material: dict[str, Any], variant: str) -> First:
+    """In this process, which must be a new one."""
+    import asperity  # noqa: F401  isort: skip  (before Mitsuba)
+    import drjit as dr
+    import mitsuba as mi
+
+    from asperity.scenes.preview import preview
+
+    mi.set_variant(variant)
+    mi.set_log_level(mi.LogLevel.Error)
+    wall, cpu = time.perf_counter(), time.process_time()
+    scene = mi.load_dict(preview(material, size=(SIZE, SIZE), spp=SPP), parallel=False)
+    dr.eval(mi.render(scene))
+    dr.sync_thread()
+    return First(time.perf_counter() - wall, time.process_time() - cpu, most_memory())
+
+
+def most_memory() -> float:
+    """The most that this process had, in MiB; 0 on Windows, which does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEBIBYTE
+
+
+if __name__ == "__main__":
+    print(json.dumps(here(json.load(sys.stdin), sys.argv[1])._asdict()))
