@@ -1,5 +1,6 @@
 """The site: what it says of the code comes from the code, and what it tells a reader to do works."""
 
+import importlib
 import re
 import shlex
 import sys
@@ -75,6 +76,30 @@ def test_the_page_of_checks_has_all_checks_in_their_order():
     from asperity.lab.checks import NAMES
 
     assert re.findall(r"^\| `(.*?)` \|", (DOCS / "checks.md").read_text(), re.MULTILINE) == list(NAMES)
+
+
+PAPERS = sorted(path.stem for path in (DOCS / "papers").glob("*.md") if path.stem != "index")
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_evidence_exists(name):
+    """Tests by the names that tables give, and what they call by module and name."""
+    page = (DOCS / "papers" / f"{name}.md").read_text()
+    tests = {
+        found
+        for path in DOCS.parent.rglob("tests/**/test_*.py")
+        for found in re.findall(r"^def (test_\w+)", path.read_text(), re.M)
+    }
+    assert set(re.findall(r"`(test_\w+)`", page)) - tests == set()
+    for module, function in re.findall(r"`([a-z]\w*)\.([A-Za-z]\w*)`", page):
+        if function != "py":
+            assert hasattr(importlib.import_module(f"asperity.models.{name}.{module}"), function), (module, function)
+
+
+def test_every_paper_has_its_page():
+    from asperity.models import with_microgeometry
+
+    assert {"twoscale", *with_microgeometry()} - set(PAPERS) == set()
 
 
 def test_the_gallery_has_all_presets_and_pictures_that_exist():
