@@ -158,7 +158,7 @@ def sweeps(name: str) -> str:
     """The pictures of a model's sweeps, with their values, in Markdown."""
     return "\n\n".join(
         f"`{parameter}` " + ", ".join(f"{value:g}" for value in values) + ":\n\n"
-        f"![Five spheres](pictures/sweeps/{name}-{parameter}.png)"
+        f"![Spheres of {name} by {parameter}](pictures/sweeps/{name}-{parameter}.png)"
         for _, parameter, values in SWEEPS[name]
     )
 

@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from asperity import loading
 from asperity.cli import COMMANDS, app
+from asperity.models import MODELS
 from asperity.scenes import presets
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -56,6 +58,17 @@ def test_a_page_can_be_followed(name, tmp_path, monkeypatch):
         elif language == "sh":
             for line in text.splitlines():
                 run(line)
+
+
+@pytest.mark.parametrize(
+    "path", [*(DOCS / f"{name}.md" for name in MODELS), DOCS.parent / "README.md"], ids=lambda path: path.stem
+)
+def test_materials_of_a_page_load(path, rgb):
+    for language, text, _ in blocks(path.read_text()):
+        if language == "python" and text.startswith("{"):
+            loading.load(eval(text))
+        elif language == "python":
+            exec(text, {})
 
 
 def test_the_page_of_commands_has_all_commands_and_options():
