@@ -31,6 +31,13 @@ def test_parameter_tables_are_those_of_the_code(name):
     assert build.with_table(page, models()[name]) == page, "run `python docs/build.py`"
 
 
+@pytest.mark.parametrize("name", models())
+def test_sweeps_are_those_of_the_pictures(name):
+    page = (ROOT / "docs" / f"{name}.md").read_text()
+    assert build.with_sweeps(page, name) == page, "run `python docs/build.py --pictures`"
+    assert [path for path in re.findall(r"\]\((pictures/.*?)\)", page) if not (ROOT / "docs" / path).is_file()] == []
+
+
 PAGES = {path.stem: path.read_text() for path in (ROOT / "docs").glob("*.md")}
 
 
