@@ -164,6 +164,24 @@ def test_plots(rgb, materials, tmp_path):
     assert len(figure.axes[0].lines) >= len(materials)
 
 
+def test_a_spectrum_needs_no_spectral_variant(rgb):
+    assert asp.plot(SLOPE, view="spectrum", theta=[30]).axes and mi.variant() == "llvm_ad_rgb"
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_rgb"])
+def test_a_comparison(variant, tmp_path):
+    """Twice the reflectance: 100 % brighter everywhere."""
+    mi.set_variant(variant)
+    found = asp.compare(GREY, {"type": "diffuse", "reflectance": 0.5})
+    assert found.numbers["mean_relative_error"] == pytest.approx(1, rel=1e-6)
+    assert found.found.albedo_difference == pytest.approx(np.full(18, 0.25), rel=1e-6)
+    found.save(tmp_path / "a.json")
+    found.save(tmp_path / "a.png")
+    assert {path.name for path in tmp_path.iterdir()} == {"a.json", "a.png"} and mi.variant() == variant
+    with pytest.raises(asp.ParameterError, match="its ending has to be one of"):
+        found.save(tmp_path / "a.jpg")
+
+
 class Lambert(LobeModel):
     """A model of one's own."""
 

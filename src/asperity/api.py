@@ -26,15 +26,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from . import drawing, goniophotometer, loading, models, plugin, validation
+from . import drawing, goniophotometer, loading, models, plugin, validation, variants
 from .arrays import CHUNK, Array, Directions, mapped
+from .drawing import comparison
 from .errors import ParameterError, refuse_unused
 from .goniophotometer.mesh import MESHES
 from .lab import checks
 from .lab import evaluate as lab
 from .materials import Material, resolve
 from .parameters import Declared
-from .results import Checks, Picture, Samples
+from .results import Checks, Compared, Picture, Samples
 from .scenes import presets as _presets
 
 NM = (360.0, 830.0)
@@ -149,7 +150,7 @@ def check(
     progress: Callable[[str, int, int], None] = checks.quiet,
 ) -> Checks:
     """Check what every BSDF must obey: sampling, reciprocity, energy, gradients and more; see `lab.checks`."""
-    _ensure_variant()
+    variants.ensure()
     found = resolve(material)
     bsdf = found.load()
     return Checks(found.name, tuple(checks.check(found.description or bsdf, progress, only)))
@@ -172,7 +173,7 @@ def measure(
     ``periodic``: `goniophotometer.Mesh` says how; heights need the ``spacing`` of their samples. ``options`` are those
     of `goniophotometer.measure`: paths, orders, apart, sensor, tiles, seed, ...
     """
-    _ensure_variant()
+    variants.ensure()
     surface = {"bsdf": bsdf, "spacing": spacing, "periodic": periodic}
     given: dict[str, Any] = {name: value for name, value in surface.items() if value is not None}
     about: dict[str, Any] = {}
@@ -199,7 +200,7 @@ def validate(model: str, folder: str | Path, *, quick: bool = False, **options: 
 
     It takes minutes, ``quick`` a tenth of them; ``options`` are those of `validation.validate`.
     """
-    _ensure_variant()
+    variants.ensure()
     return validation.validate(model, folder, quick=quick, **options)
 
 
@@ -217,7 +218,7 @@ def render(
     """
     from .scenes.preview import preview
 
-    _ensure_variant()
+    variants.ensure()
     width, height = size if isinstance(size, tuple) else (size, size)
     for name, value in {"width": width, "height": height, "spp": spp}.items():
         if not (isinstance(value, int) and 0 < value <= 2**15):
@@ -231,11 +232,22 @@ def render(
 def plot(*materials: Any, view: str = "lobes", **options: Any) -> Figure:
     """A figure of one or several materials, for its ``savefig``; ``view`` and ``options`` are those of `drawing.plot`.
 
-    In spectral variants, or where the option ``wavelengths`` asks for one, at these wavelengths.
+    The view ``spectrum``, and the option ``wavelengths``, are answered in a spectral variant; measurements, in one with
+    their channels.
     """
-    active = _ensure_variant()
-    with _variant(_arrays(active, options.get("wavelengths") is not None)):
-        return drawing.plot([resolve(material) for material in materials], view, **options)
+    found = [resolve(material) for material in materials]
+    with variants.switched(variants.of(found, view == "spectrum" or options.get("wavelengths") is not None)):
+        return drawing.plot(found, view, **options)
+
+
+def compare(a: Any, b: Any) -> Compared:
+    """How far material ``b`` is from ``a``, the reference: numbers, values over all directions, and a figure.
+
+    Measurements are compared in their own directions, and with the noise that they know of.
+    """
+    first, second = found = resolve(a), resolve(b)
+    with variants.switched(variants.of(found)):
+        return Compared(first, second, comparison.compare(first, second, drawing.distinct_names(found)))
 
 
 def presets() -> dict[str, Material]:
@@ -299,39 +311,13 @@ def _loaded(material: Any, wavelengths: Sequence[float] | None = None, colourles
 
     In a spectral variant these have to be, unless what is asked for is ``colourless``.
     """
-    found, active = resolve(material), _ensure_variant()
-    with _variant(_arrays(active, wavelengths is not None)):
+    found = resolve(material)
+    with variants.switched(variants.of_arrays(wavelengths is not None)):
         channels = dr.size_v(mi.UnpolarizedSpectrum)
         chosen = _wavelengths(wavelengths, channels if colourless else 0)
         groups: list[Any] = [_filled(chosen[k : k + channels], channels) for k in range(0, len(chosen), channels)]
         theta = (0.0, 90.0) if found.measured is None else tuple(found.measured.incident[[0, -1], 0])
         yield _Loaded(found.name, found.load(), groups or [None], len(chosen) or channels, theta)
-
-
-def _arrays(variant: str, wavelengths: bool) -> str:
-    """The variant like this one that computes arrays, and wavelengths, if they are asked for."""
-    found = variant.replace("scalar_", "llvm_ad_")
-    return f"{found.partition('_')[0]}_ad_spectral" if wavelengths and "spectral" not in found else found
-
-
-@contextmanager
-def _variant(wanted: str) -> Iterator[None]:
-    """That variant, for a while."""
-    active = mi.variant()
-    try:
-        if wanted != active:
-            mi.set_variant(wanted)
-        yield
-    finally:
-        if wanted != active:
-            mi.set_variant(active)
-
-
-def _ensure_variant() -> str:
-    """The active variant; ``llvm_ad_rgb``, from now on, if there is none."""
-    if mi.variant() is None:
-        mi.set_variant("llvm_ad_rgb")
-    return str(mi.variant())
 
 
 def _wavelengths(given: Sequence[float] | None, default: int) -> tuple[float, ...]:
