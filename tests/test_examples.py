@@ -13,6 +13,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 QUICK = ("slice", "dust")
 
 
+@pytest.mark.slow
 def test_the_page_of_python(tmp_path, monkeypatch, capsys, rgb, registry):
     """Every block, one after the other; what is printed stands in it as a comment."""
     monkeypatch.chdir(tmp_path)
