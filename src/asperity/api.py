@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import drjit as dr
 import mitsuba as mi
@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 from . import drawing, goniophotometer, loading, models, plugin, validation, variants
 from .arrays import CHUNK, Array, Directions, mapped
 from .drawing import comparison
-from .errors import ParameterError, refuse_unused
+from .errors import ParameterError, refuse_unused, whole
 from .goniophotometer.mesh import MESHES
 from .lab import checks
 from .lab import evaluate as lab
@@ -44,6 +44,7 @@ SOBOL = 2**14
 """Samples of an albedo: of smooth BSDFs it has four digits then."""
 
 material = resolve
+Model = TypeVar("Model")
 
 
 def evaluate(
@@ -82,7 +83,7 @@ def pdf(material: Any, wi: ArrayLike, wo: ArrayLike, *, out: Any = None, chunk: 
             return lab.to_numpy(target.bsdf.pdf(mi.BSDFContext(), si, lab.vectors(o)), len(i)).T
 
         directions = target.directions(wi=wi, wo=wo)
-        return mapped(values, directions, 1, None if out is None else out[..., None], chunk)[..., 0]
+        return mapped(values, directions, 1, out[..., None] if isinstance(out, np.ndarray) else out, chunk)[..., 0]
 
 
 def albedo(
@@ -97,8 +98,9 @@ def albedo(
 
     It is the mean weight of ``samples`` points of Sobol's sequence, a power of two: the same in every call.
     """
-    if not (isinstance(samples, int) and samples > 0 and samples & (samples - 1) == 0):
-        raise ParameterError(f"samples = {samples!r}: expected a power of two, such as {SOBOL}.")
+    samples = whole("samples", samples, 1)
+    if samples & (samples - 1):
+        raise ParameterError(f"samples = {samples}: expected a power of two, such as {SOBOL}.")
     with _loaded(material, wavelengths) as target:
         angles = target.directions(theta=_angles(theta, phi))
 
@@ -123,9 +125,7 @@ def sample(
     The same ``seed`` gives the same directions, whatever the chunk. All channels share a direction, so there are at
     most as many ``wavelengths`` as a spectral variant has channels.
     """
-    if not (isinstance(n, int) and n > 0):
-        raise ParameterError(f"n = {n!r}: expected a whole number above 0.")
-    random = np.random.default_rng(seed)
+    n, random = whole("n", n, 1), np.random.default_rng(whole("seed", seed, 0))
     with _loaded(material, wavelengths) as target:
         if len(target.groups) > 1:
             most = dr.size_v(mi.UnpolarizedSpectrum)
@@ -145,7 +145,7 @@ def sample(
 
 def check(
     material: Any,
-    only: Sequence[str] = checks.NAMES,
+    only: str | Sequence[str] = checks.NAMES,
     *,
     progress: Callable[[str, int, int], None] = checks.quiet,
 ) -> Checks:
@@ -153,7 +153,8 @@ def check(
     variants.ensure()
     found = resolve(material)
     bsdf = found.load()
-    return Checks(found.name, tuple(checks.check(found.description or bsdf, progress, only)))
+    names = [only] if isinstance(only, str) else only
+    return Checks(found.name, tuple(checks.check(found.description or bsdf, progress, names)))
 
 
 def measure(
@@ -220,9 +221,9 @@ def render(
 
     variants.ensure()
     width, height = size if isinstance(size, tuple) else (size, size)
-    for name, value in {"width": width, "height": height, "spp": spp}.items():
-        if not (isinstance(value, int) and 0 < value <= 2**15):
-            raise ParameterError(f"{name} = {value!r}: expected a whole number in [1, {2**15}].")
+    for name, value, most in (("width", width, 2**15), ("height", height, 2**15), ("spp", spp, 2**31)):
+        whole(name, value, 1, most)
+    whole("seed", seed, 0, 2**32 - 1)
     found = resolve(material)
     bsdf = found.load()
     scene = loading.load(preview(found.description or bsdf, size=(width, height), **found.preview | view))
@@ -255,7 +256,7 @@ def presets() -> dict[str, Material]:
     return {name: resolve(name) for name in _presets.names()}
 
 
-def register(model: type, name: str | None = None) -> type:
+def register(model: type[Model], name: str | None = None) -> type[Model]:
     """Make a model of one's own, derived from `lobes.LobeModel`, a plugin; returns it, so that it can decorate.
 
     It is called ``name``, or as its class in small letters. In every variant, at once and from now on. A model that was
@@ -264,7 +265,8 @@ def register(model: type, name: str | None = None) -> type:
     if not (isinstance(model, type) and issubclass(model, Declared)):
         raise ParameterError(f"model = {model!r}: expected a class derived from asperity.lobes.LobeModel.")
     name = name or model.__name__.lower()
-    taken = name in models.MODELS and not getattr(models.MODELS[name], "registered", False)
+    known = models.MODELS | models.TEXTURES | models.PHASES
+    taken = name in known and not getattr(known[name], "registered", False)
     if taken or mi.PluginManager.instance().plugin_type(name) != mi.ObjectType.Unknown:
         raise ParameterError(f"name = {name!r}: there is such a plugin already. Take another.")
     model.registered = True  # type: ignore[attr-defined]
@@ -284,7 +286,7 @@ class _Loaded(NamedTuple):
     width: int
     """Channels that are asked for."""
     measured: tuple[float, float]
-    """Range of θi, in degrees, where there are values."""
+    """Range of θi in degrees."""
 
     def directions(self, **given: Any) -> list[Directions]:
         """Directions by the name of their parameter, which have to be where this BSDF has values."""
@@ -316,8 +318,7 @@ def _loaded(material: Any, wavelengths: Sequence[float] | None = None, colourles
         channels = dr.size_v(mi.UnpolarizedSpectrum)
         chosen = _wavelengths(wavelengths, channels if colourless else 0)
         groups: list[Any] = [_filled(chosen[k : k + channels], channels) for k in range(0, len(chosen), channels)]
-        theta = (0.0, 90.0) if found.measured is None else tuple(found.measured.incident[[0, -1], 0])
-        yield _Loaded(found.name, found.load(), groups or [None], len(chosen) or channels, theta)
+        yield _Loaded(found.name, found.load(), groups or [None], len(chosen) or channels, found.incidence)
 
 
 def _wavelengths(given: Sequence[float] | None, default: int) -> tuple[float, ...]:
@@ -328,7 +329,10 @@ def _wavelengths(given: Sequence[float] | None, default: int) -> tuple[float, ..
         return tuple(np.linspace(450, 650, default))
     if given is None:
         raise ParameterError(f"wavelengths: variant {mi.variant()} needs them, in nm; [450, 550, 650], say.")
-    array = np.asarray(given, dtype=np.float64)
+    try:
+        array = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
     if array.ndim != 1 or not array.size or not np.all((array >= NM[0]) & (array <= NM[1])):
         raise ParameterError(f"wavelengths = {loading.short(given)}: expected a list of numbers in {list(NM)} nm.")
     return tuple(array.tolist())

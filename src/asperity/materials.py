@@ -50,6 +50,19 @@ class Material:
     preview: dict[str, Any] = field(default_factory=dict)
     measured: Measurement | None = None
 
+    @property
+    def incidence(self) -> tuple[float, float]:
+        """The range of θi, in degrees, that was measured; beyond it Mitsuba would repeat the last values."""
+        import numpy as np
+
+        if self.measured is not None:
+            theta = self.measured.incident[:, 0]
+        elif self.description is not None and self.description.get("type") in TENSORS.values():
+            theta = np.degrees(loading.tensors(Path(self.description["filename"]))["theta_i"])
+        else:
+            return 0.0, 90.0
+        return float(theta.min()), float(theta.max())
+
     def load(self) -> Any:
         """The ``mi.BSDF`` of the active variant; raises ParameterError if there is none.
 
@@ -81,6 +94,7 @@ def resolve(what: Any, settings: Iterable[str] | Mapping[str, Any] = ()) -> Mate
     No variant needs to be set. Raises UnknownNameError, UnreadableFileError or ParameterError.
     """
     found = _found(what)
+    settings = [settings] if isinstance(settings, str) else settings
     if not settings:
         return found
     if found.description is None:
@@ -134,7 +148,7 @@ def _from_name(name: str) -> Material:
 
 
 def _from_file(path: Path) -> Material:
-    if path.is_dir():
+    if os.path.isdir(path):
         raise UnreadableFileError("material", path, FORMATS, "it is a folder")
     readable("material", path, FORMATS)
     ending = path.suffix.lower()
