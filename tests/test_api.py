@@ -131,6 +131,9 @@ def test_what_is_measured(rgb, tmp_path):
     model = asp.measure("vgroove", 0, **effort)
     assert model.about["model"]["type"] == "vgroove"
     assert mesh.plot().axes and model.plot().axes
+    mi.set_variant("scalar_rgb")
+    assert asp.measure(tmp_path / "flat.obj", 30, **effort, wavelengths=[450, 500, 550, 600]).mode == "spectral"
+    assert mi.variant() == "scalar_rgb"
 
 
 def test_checks(rgb, tmp_path):
@@ -233,6 +236,7 @@ BAD = {
     "seed": (lambda: asp.sample(GREY, UP, 5, seed=-1), "seed = -1: expected a whole number, at least 0"),
     "words": (lambda: asp.evaluate(GREY, UP, UP, wavelengths=["red"]), r"wavelengths = \['red'\]: expected a list"),
     "theta": (lambda: asp.albedo(GREY, 100), r"theta\[0\] = \(100, 0\): .* within \[0, 90\]"),
+    "glass": (lambda: asp.albedo({"type": "roughdielectric"}, 100), r"theta\[0\] = \(100, 0\): .* within \[0, 90\]"),
     "word": (lambda: asp.albedo(GREY, "up"), "theta and phi: expected numbers"),
     "samples": (lambda: asp.albedo(GREY, 0, samples=100), "samples = 100: expected a power of two"),
     "n": (lambda: asp.sample(GREY, UP, 0), "n = 0: expected a whole number, at least 1"),

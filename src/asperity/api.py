@@ -33,7 +33,7 @@ from .errors import ParameterError, refuse_unused, whole
 from .goniophotometer.mesh import MESHES
 from .lab import checks
 from .lab import evaluate as lab
-from .materials import Material, resolve
+from .materials import ABOVE, Material, resolve
 from .parameters import Declared
 from .results import Checks, Compared, Picture, Samples
 from .scenes import presets as _presets
@@ -68,7 +68,7 @@ def evaluate(
         def values(i: Array, o: Array) -> Array:
             return target.channels(lambda si: target.bsdf.eval(mi.BSDFContext(), si, lab.vectors(o)), i)
 
-        return mapped(values, target.directions(wi=wi, wo=wo), target.width, out, chunk)
+        return mapped(values, [target.incident("wi", wi), target.outgoing("wo", wo)], target.width, out, chunk)
 
 
 def pdf(material: Any, wi: ArrayLike, wo: ArrayLike, *, out: Any = None, chunk: int = CHUNK) -> Array:
@@ -82,7 +82,7 @@ def pdf(material: Any, wi: ArrayLike, wo: ArrayLike, *, out: Any = None, chunk: 
             si = lab.interaction(lab.vectors(i), len(i), target.groups[0])
             return lab.to_numpy(target.bsdf.pdf(mi.BSDFContext(), si, lab.vectors(o)), len(i)).T
 
-        directions = target.directions(wi=wi, wo=wo)
+        directions = [target.incident("wi", wi), target.outgoing("wo", wo)]
         return mapped(values, directions, 1, out[..., None] if isinstance(out, np.ndarray) else out, chunk)[..., 0]
 
 
@@ -102,13 +102,13 @@ def albedo(
     if samples & (samples - 1):
         raise ParameterError(f"samples = {samples}: expected a power of two, such as {SOBOL}.")
     with _loaded(material, wavelengths) as target:
-        angles = target.directions(theta=_angles(theta, phi))
+        angles = Directions("theta", _angles(theta, phi), *target.incidence)
 
         def values(i: Array) -> Array:
             found = [lab.albedo(target.bsdf, i, samples, group) for group in target.groups]
             return np.concatenate(found)[: target.width].T
 
-        return mapped(values, angles, target.width, chunk=max(1, CHUNK // samples))
+        return mapped(values, [angles], target.width, chunk=max(1, CHUNK // samples))
 
 
 def sample(
@@ -138,8 +138,7 @@ def sample(
             parts = (bs.wo, bs.pdf, mi.unpolarized_spectrum(weight))
             return np.concatenate([lab.to_numpy(part, len(i)) for part in parts])[: 4 + target.width].T
 
-        [given] = target.directions(wi=wi)
-        found = mapped(values, [given.repeated(n)], 4 + target.width, chunk=chunk)
+        found = mapped(values, [target.incident("wi", wi).repeated(n)], 4 + target.width, chunk=chunk)
         return Samples(found[..., :3], found[..., 4:], found[..., 3])
 
 
@@ -174,26 +173,28 @@ def measure(
     ``periodic``: `goniophotometer.Mesh` says how; heights need the ``spacing`` of their samples. ``options`` are those
     of `goniophotometer.measure`: paths, orders, apart, sensor, tiles, seed, ...
     """
-    variants.ensure()
     surface = {"bsdf": bsdf, "spacing": spacing, "periodic": periodic}
-    given: dict[str, Any] = {name: value for name, value in surface.items() if value is not None}
-    about: dict[str, Any] = {}
-    if isinstance(what, (str, Path)) and Path(what).suffix.lower() in MESHES:
-        geometry: Any = goniophotometer.from_file("mesh", what, **given)
-    elif isinstance(what, np.ndarray):
-        if spacing is None:
-            raise ParameterError("spacing: heights need the distance between them.")
-        geometry = goniophotometer.HeightField(what, **given)
-    else:
-        refuse_unused(surface, (), "what is neither a mesh nor heights")
-        geometry = what
-        if not hasattr(what, "piece"):
-            found = resolve(what)
-            found.load()
-            geometry = models.microgeometry(found.description or {"type": found.name})
-            about = {"model": found.description}
     incident = [(float(t), float(p)) for t, p in _angles(theta, phi).reshape(-1, 2)]
-    return goniophotometer.measure(geometry, incident, **{"about": about} | options)
+    with variants.switched(variants.of_arrays(options.get("wavelengths") is not None)):
+        geometry, about = _microgeometry(what, surface)
+        return goniophotometer.measure(geometry, incident, **{"about": about} | options)
+
+
+def _microgeometry(what: Any, surface: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """What to trace light through, and what to note about it; ``surface`` holds options of meshes and heights."""
+    given: dict[str, Any] = {name: value for name, value in surface.items() if value is not None}
+    if isinstance(what, (str, Path)) and Path(what).suffix.lower() in MESHES:
+        return goniophotometer.from_file("mesh", what, **given), {}
+    if isinstance(what, np.ndarray):
+        if "spacing" not in given:
+            raise ParameterError("spacing: heights need the distance between them.")
+        return goniophotometer.HeightField(what, **given), {}
+    refuse_unused(surface, (), "what is neither a mesh nor heights")
+    if hasattr(what, "piece"):
+        return what, {}
+    found = resolve(what)
+    found.load()
+    return models.microgeometry(found.description or {"type": found.name}), {"model": found.description}
 
 
 def validate(model: str, folder: str | Path, *, quick: bool = False, **options: Any) -> validation.Report:
@@ -285,20 +286,21 @@ class _Loaded(NamedTuple):
     """Wavelengths, as many at a time as the variant has channels; one group, None, if it has none."""
     width: int
     """Channels that are asked for."""
-    measured: tuple[float, float]
-    """Range of θi in degrees."""
+    incidence: tuple[float, float]
+    """Range of θi, in degrees, where there are values of light from above."""
 
-    def directions(self, **given: Any) -> list[Directions]:
-        """Directions by the name of their parameter, which have to be where this BSDF has values."""
-        flags = self.bsdf.flags()
-        through = mi.has_flag(flags, mi.BSDFFlags.Transmission) or mi.has_flag(flags, mi.BSDFFlags.BackSide)
-        high, reason = (180.0, "") if through else (90.0, f": {self.name} has no values below its surface")
-        return [
-            Directions(name, array, high=high, reason=reason)
-            if name == "wo" or self.measured == (0.0, 90.0)
-            else Directions(name, array, *self.measured, f": there {self.name} was measured")
-            for name, array in given.items()
-        ]
+    def outgoing(self, name: str, given: ArrayLike) -> Directions:
+        """Directions, the parameter ``name``, on the sides of the surface where this BSDF has values."""
+        sides = mi.BSDFFlags.Transmission, mi.BSDFFlags.BackSide
+        if any(mi.has_flag(self.bsdf.flags(), side) for side in sides):
+            return Directions(name, given)
+        return Directions(name, given, high=90, reason=f": {self.name} has no values below its surface")
+
+    def incident(self, name: str, given: ArrayLike) -> Directions:
+        """The same, where it was measured, if it was."""
+        if self.incidence == ABOVE:
+            return self.outgoing(name, given)
+        return Directions(name, given, *self.incidence, f": there {self.name} was measured")
 
     def channels(self, function: Callable[[Any], Any], wi: Array) -> Array:
         """What ``function`` of the surface interaction gives, (n, channels), at all wavelengths."""

@@ -31,6 +31,8 @@ Description = dict[str, Any]
 TENSORS = {".bsdf": "measured", ".pbsdf": "measured_polarized"}
 """Mitsuba's plugins for measurements, by the endings of their files."""
 FORMATS = (".json", ".xml", ".npz", *TENSORS)
+ABOVE = (0.0, 90.0)
+"""θ, in degrees, of all directions above a surface."""
 TRIED = (
     f"Tried: presets, models, Mitsuba's BSDFs, and files ({', '.join(FORMATS)}). `asperity list` shows presets and "
     "models."
@@ -60,7 +62,7 @@ class Material:
         elif self.description is not None and self.description.get("type") in TENSORS.values():
             theta = np.degrees(loading.tensors(Path(self.description["filename"]))["theta_i"])
         else:
-            return 0.0, 90.0
+            return ABOVE
         return float(theta.min()), float(theta.max())
 
     def load(self) -> Any:
