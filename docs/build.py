@@ -14,6 +14,7 @@ from textwrap import fill
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- parameters: made by docs/build.py -->", "<!-- end of parameters -->"
 BEGIN_SPEED, END_SPEED = "<!-- speed: made by docs/build.py -->", "<!-- end of speed -->"
+BEGIN_KEPT, END_KEPT = "<!-- kept: made by docs/build.py -->", "<!-- end of kept -->"
 SPEED = DOCS / "speed.json"
 CALLS, FRAMES = ("eval_pdf", "sample"), ("bare", "preview", "filled")
 """Columns of `speed.json`: nanoseconds, and seconds."""
@@ -38,6 +39,44 @@ CIRCUMSTANCES = "Mitsuba {mitsuba}, Dr.Jit {drjit}, LLVM {llvm}; commit {commit}
 MACBETH = {"orange": (214, 126, 44), "blue flower": (133, 128, 177), "bluish green": (103, 189, 170)}
 """Patches of the ColorChecker, as its maker gives them: sRGB of 8 bits."""
 INDICES = (1.0, 1.2, 1.33, 1.5)
+WHITE = {"type": "rgb", "value": 1.0}
+PAINT = {"type": "interfacedlambertian", "diffuse_reflectance": WHITE}
+GRAINS = {"type": "micrograin", "tau_0": 0.5, "base": {"type": "diffuse", "reflectance": WHITE}}
+KEPT = (
+    ("`roughconductor`", {"type": "roughconductor", "distribution": "ggx", "material": "none"}, "alpha"),
+    ("`vgroove`", {"type": "vgroove", "material": "none"}, "alpha"),
+    ("`roughplastic`, nonlinear", {"type": "roughplastic", "nonlinear": True, "diffuse_reflectance": WHITE}, "alpha"),
+    ("`interfacedlambertian`", PAINT, "alpha"),
+    ("the same, `scattering: multiple`", {**PAINT, "scattering": "multiple", "masking": "vcavity"}, "alpha"),
+    ("`micrograin`, mirrors on white, tau_0 .5", GRAINS, "beta"),
+    ("the same, `scattering: multiple`", {**GRAINS, "scattering": "multiple"}, "beta"),
+)
+"""White materials, and the parameter that makes them rough."""
+ROUGHNESSES, TILTS = (0.1, 0.3, 0.6, 1.0), (1.0, 60.0)
+BEGIN_SWEEPS, END_SWEEPS = "<!-- sweeps: made by docs/build.py -->", "<!-- end of sweeps -->"
+DUST = {"type": "micrograin", "specular": False, "diffuse_reflectance": 0.5, "beta": 1.5}
+RED = {"type": "rgb", "value": [0.45, 0.06, 0.03]}
+SWEEPS: dict[str, tuple[tuple[dict, str, tuple[float, ...]], ...]] = {
+    "micrograin": (
+        ({**DUST, "base": {"type": "diffuse", "reflectance": RED}}, "tau_0", (0.05, 0.2, 0.4, 0.6, 0.85)),
+        ({"type": "micrograin", "material": "Au", "tau_0": 0.6}, "beta", (0.02, 0.1, 0.3, 1.0, 3.0)),
+    ),
+    "deon": (({"type": "deon", "material": "Au", "beta": 0.3}, "tau_0", (0.05, 0.2, 0.4, 0.6, 0.85)),),
+    "merillou": (({"type": "merillou", "material": "Au", "beta": 0.3}, "tau_0", (0.05, 0.2, 0.4, 0.6, 0.85)),),
+    "vgroove": (({"type": "vgroove", "material": "Cu"}, "alpha", (0.02, 0.1, 0.3, 0.6, 1.0)),),
+    "lambertsphere": (({"type": "lambertsphere"}, "reflectance", (0.05, 0.2, 0.4, 0.7, 0.95)),),
+    "chandrasekhar": (({"type": "chandrasekhar"}, "reflectance", (0.05, 0.2, 0.4, 0.7, 0.95)),),
+    "orennayar": (({"type": "orennayar"}, "sigma", (0.0, 10.0, 20.0, 30.0, 45.0)),),
+    "interfacedlambertian": (
+        ({"type": "interfacedlambertian", "diffuse_reflectance": RED}, "alpha", (0.02, 0.1, 0.3, 0.6, 1.0)),
+        ({"type": "interfacedlambertian", "diffuse_reflectance": RED}, "int_ior", (1.0003, 1.1, 1.3, 1.5, 2.0)),
+    ),
+    "twoscale": (
+        ({"type": "twoscale", "material": "Ni_palik", "alpha": 0.05}, "sigma_s", (0.0, 0.01, 0.02, 0.04, 0.08)),
+        ({"type": "twoscale", "material": "Ni_palik", "alpha": 0.05, "sigma_s": 0.0}, "p", (0.3, 0.5, 0.7, 1.0, 1.5)),
+    ),
+}
+"""What a parameter does: a material, the parameter, and its values."""
 STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", "dirty-weave")
 
 
@@ -95,6 +134,32 @@ def with_speed(page: str, name: str, report: dict) -> str:
     return between(page, BEGIN_SPEED, speed_table(name, report), END_SPEED) if BEGIN_SPEED in page else page
 
 
+def kept() -> list[list[float]]:
+    """Albedos of the white materials, by angle of incidence and roughness."""
+    import mitsuba as mi
+
+    from asperity.lab import evaluate
+    from asperity.lab.checks.samples import SAMPLES, draw_samples
+
+    mi.set_variant("llvm_ad_rgb")
+
+    def albedo(description: dict, theta: float) -> float:
+        drawn = draw_samples(evaluate.load(description), evaluate.direction(theta, 0), SAMPLES, seed=1)
+        return float(drawn.weight.mean())
+
+    return [
+        [albedo({**white, rough: value}, theta) for theta in TILTS for value in ROUGHNESSES] for _, white, rough in KEPT
+    ]
+
+
+def kept_table() -> str:
+    """The same in Markdown."""
+    heads = [f"{theta:.0f}°, {value:g}" for theta in TILTS for value in ROUGHNESSES]
+    lines = ["| | " + " | ".join(heads) + " |", "|" + "---|" * (len(heads) + 1)]
+    lines += [f"| {name} | " + " | ".join(f"{x:.2f}" for x in row) + " |" for (name, *_), row in zip(KEPT, kept())]
+    return "\n".join(lines)
+
+
 def strip(path: Path, size: int = 256, spp: int = 256) -> None:
     """Six presets side by side."""
     import mitsuba as mi
@@ -110,6 +175,37 @@ def strip(path: Path, size: int = 256, spp: int = 256) -> None:
         scene = preview(preset.material, **preset.preview, size=(size, size), spp=spp)
         images.append(np.asarray(mi.render(mi.load_dict(scene, parallel=False))))
     mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)[..., :3]), write_async=False)
+
+
+def sweeps(name: str) -> str:
+    """The pictures of a model's sweeps, with their values, in Markdown."""
+    return "\n\n".join(
+        f"`{parameter}` " + ", ".join(f"{value:g}" for value in values) + ":\n\n"
+        f"![Spheres of {name} by {parameter}](pictures/sweeps/{name}-{parameter}.png)"
+        for _, parameter, values in SWEEPS[name]
+    )
+
+
+def with_sweeps(page: str, name: str) -> str:
+    """The page with the sweeps of the model ``name`` between the marks."""
+    return between(page, BEGIN_SWEEPS, sweeps(name), END_SWEEPS)
+
+
+def draw_sweeps(folder: Path, size: int = 128, spp: int = 256) -> None:
+    """A row of spheres for each sweep."""
+    import mitsuba as mi
+    import numpy as np
+
+    from asperity.scenes.preview import preview
+
+    mi.set_variant("llvm_ad_rgb")
+    for name, parameter, material, values in ((n, p, m, v) for n, found in SWEEPS.items() for m, p, v in found):
+        scenes = [
+            preview({**material, parameter: value}, object="sphere", size=(size, size), spp=spp) for value in values
+        ]
+        images = [np.asarray(mi.render(mi.load_dict(scene, parallel=False)))[..., :3] for scene in scenes]
+        path = folder / f"{name}-{parameter}.png"
+        mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)), write_async=False)
 
 
 def linear(patch: str) -> list[float]:
@@ -172,10 +268,13 @@ def main() -> None:
     report = json.loads(SPEED.read_text())  # by `asperity bench --json docs/speed.json --force`
     for name, model in MODELS.items():
         page = DOCS / f"{name}.md"
-        page.write_text(with_speed(with_table(page.read_text(), model), name, report))
+        page.write_text(with_sweeps(with_speed(with_table(page.read_text(), model), name, report), name))
+    page = DOCS / "which.md"
+    page.write_text(between(page.read_text(), BEGIN_KEPT, kept_table(), END_KEPT))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         figures(DOCS / "pictures")
+        draw_sweeps(DOCS / "pictures" / "sweeps")
         patches(DOCS / "pictures" / "macbeth.png")
 
 

@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -30,6 +31,13 @@ def test_parameter_tables_are_those_of_the_code(name):
     assert build.with_table(page, models()[name]) == page, "run `python docs/build.py`"
 
 
+@pytest.mark.parametrize("name", models())
+def test_sweeps_are_those_of_the_pictures(name):
+    page = (ROOT / "docs" / f"{name}.md").read_text()
+    assert build.with_sweeps(page, name) == page, "run `python docs/build.py --pictures`"
+    assert [path for path in re.findall(r"\]\((pictures/.*?)\)", page) if not (ROOT / "docs" / path).is_file()] == []
+
+
 PAGES = {path.stem: path.read_text() for path in (ROOT / "docs").glob("*.md")}
 
 
@@ -44,6 +52,13 @@ def test_all_models_are_timed_and_have_a_table_of_it():
 
     timed = {peers.model_of(name) for group in peers.groups() for name in group} & models().keys()
     assert timed == models().keys() == {name for name, page in PAGES.items() if build.BEGIN_SPEED in page}
+
+
+@pytest.mark.slow
+def test_light_that_is_kept_is_what_the_page_says():
+    """Two digits are printed; the means of the samples have standard errors of .001."""
+    rows = re.findall(r"^\| .*? \| ([\d. |]+) \|$", PAGES["which"].split(build.BEGIN_KEPT)[1], re.MULTILINE)
+    assert np.allclose([[float(x) for x in row.split("|")] for row in rows], build.kept(), rtol=0, atol=0.01)
 
 
 def test_readme_begins_with_a_picture_and_two_commands():

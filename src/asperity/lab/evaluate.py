@@ -18,6 +18,8 @@ from asperity.errors import ParameterError
 
 SHORTEST, LONGEST = 400.0, 700.0
 """nm. Spectral variants evaluate at wavelengths between these."""
+ALL = 0xFFFFFFFF
+"""Components of a BSDF."""
 
 
 def active_variant() -> str:
@@ -198,14 +200,26 @@ def cell_means(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray, wavelengths: Any =
     return to_numpy(value, lanes).reshape(-1, *wo.shape[:-1]).mean(axis=-1)
 
 
-def albedo(bsdf: mi.BSDF, wi: np.ndarray, samples: int = 2**18, wavelengths: Any = None) -> np.ndarray:
+def albedo(
+    bsdf: mi.BSDF,
+    wi: np.ndarray,
+    samples: int = 2**18,
+    wavelengths: Any = None,
+    *,
+    component: int = ALL,
+    below: bool = False,
+) -> np.ndarray:
     """Directional albedo, the share that is reflected upwards, for directions (n, 3): (channels, n).
 
-    The mean weight of ``samples`` points of Sobol's sequence, a power of two.
+    The mean weight of ``samples`` points of Sobol's sequence, a power of two. Of one ``component`` of the BSDF, if it
+    is given; with ``below``, the share that leaves downwards instead.
     """
     points = qmc.Sobol(3, seed=1).random(samples)
     u = np.tile(points, (len(wi), 1)).T
     si = interaction(vectors(np.repeat(wi, samples, axis=0)), u.shape[1], wavelengths)
-    bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
-    reflected = dr.select(bs.wo.z > 0, mi.unpolarized_spectrum(weight), 0)
-    return to_numpy(reflected, u.shape[1]).reshape(-1, len(wi), samples).mean(axis=-1)
+    # Power, not radiance, which is scaled where it enters glass.
+    context = mi.BSDFContext(mi.TransportMode.Importance, int(mi.BSDFFlags.All), component)
+    bs, weight = bsdf.sample(context, si, mi.Float(u[0]), mi.Point2f(u[1:]))
+    leaves = bs.wo.z < 0 if below else bs.wo.z > 0
+    found = dr.select(leaves, mi.unpolarized_spectrum(weight), 0)
+    return to_numpy(found, u.shape[1]).reshape(-1, len(wi), samples).mean(axis=-1)
