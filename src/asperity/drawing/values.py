@@ -220,7 +220,7 @@ def in_azimuth(x: np.ndarray, phi: np.ndarray | float) -> np.ndarray:
 def _points(theta: float, below: bool, cosine: bool) -> np.ndarray:
     """Signed θo of a curve, denser near the light and the mirrored direction; their number is always the same."""
     end = 180.0 if below else 90.0
-    even = np.arange(-end, end + STEP / 2, STEP)
+    even = np.linspace(-end, end, round(2 * end / STEP) + 1)
     fine = np.arange(-NEAR, NEAR + FINE / 2, FINE)
     x = np.sort(np.concatenate([even, theta + fine, -theta + fine]))
     x = np.clip(x, -end, end)
