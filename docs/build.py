@@ -18,6 +18,24 @@ BEGIN_KEPT, END_KEPT = "<!-- kept: made by docs/build.py -->", "<!-- end of kept
 SPEED = DOCS / "speed.json"
 CALLS, FRAMES = ("eval_pdf", "sample"), ("bare", "preview", "filled")
 """Columns of `speed.json`: nanoseconds, and seconds."""
+MORE = {
+    "first picture, s": ("first", lambda found: f"{found['first']['time'][1]:.1f}"),
+    "memory, MiB": ("memory", lambda found: f"{found['memory']['value'][1]:.0f}"),
+    "noise, *environment*": ("point", lambda found: noise(found["filled"])),
+    "noise, *point*": ("point", lambda found: noise(found["point"])),
+}
+"""What newer files have too: the column that says so, and what is told of it."""
+NOTE = (
+    "`asperity bench`, one process, {threads} threads of {machine}: medians of {rounds} rounds in which all take "
+    "turns, ± half the distance of the quartiles. Frames of {size} x {size} pixels over those of the first row; calls "
+    "by the lane, of {lanes} random directions. "
+)
+NOTE_OF_MORE = (
+    "The first picture is that of a new process without compiled code, with the most memory that it takes. Noise is "
+    "the variance of pixels at equal samples over that of the first row, of *filled* under its environment map and of "
+    "*bare* by its point light alone; in brackets it is multiplied by the time of the frame. "
+)
+CIRCUMSTANCES = "Mitsuba {mitsuba}, Dr.Jit {drjit}, LLVM {llvm}; commit {commit}."
 MACBETH = {"orange": (214, 126, 44), "blue flower": (133, 128, 177), "bluish green": (103, 189, 170)}
 """Patches of the ColorChecker, as its maker gives them: sRGB of 8 bits."""
 INDICES = (1.0, 1.2, 1.33, 1.5)
@@ -35,6 +53,30 @@ KEPT = (
 )
 """White materials, and the parameter that makes them rough."""
 ROUGHNESSES, TILTS = (0.1, 0.3, 0.6, 1.0), (1.0, 60.0)
+BEGIN_SWEEPS, END_SWEEPS = "<!-- sweeps: made by docs/build.py -->", "<!-- end of sweeps -->"
+DUST = {"type": "micrograin", "specular": False, "diffuse_reflectance": 0.5, "beta": 1.5}
+RED = {"type": "rgb", "value": [0.45, 0.06, 0.03]}
+SWEEPS: dict[str, tuple[tuple[dict, str, tuple[float, ...]], ...]] = {
+    "micrograin": (
+        ({**DUST, "base": {"type": "diffuse", "reflectance": RED}}, "tau_0", (0.05, 0.2, 0.4, 0.6, 0.85)),
+        ({"type": "micrograin", "material": "Au", "tau_0": 0.6}, "beta", (0.02, 0.1, 0.3, 1.0, 3.0)),
+    ),
+    "deon": (({"type": "deon", "material": "Au", "beta": 0.3}, "tau_0", (0.05, 0.2, 0.4, 0.6, 0.85)),),
+    "merillou": (({"type": "merillou", "material": "Au", "beta": 0.3}, "tau_0", (0.05, 0.2, 0.4, 0.6, 0.85)),),
+    "vgroove": (({"type": "vgroove", "material": "Cu"}, "alpha", (0.02, 0.1, 0.3, 0.6, 1.0)),),
+    "lambertsphere": (({"type": "lambertsphere"}, "reflectance", (0.05, 0.2, 0.4, 0.7, 0.95)),),
+    "chandrasekhar": (({"type": "chandrasekhar"}, "reflectance", (0.05, 0.2, 0.4, 0.7, 0.95)),),
+    "orennayar": (({"type": "orennayar"}, "sigma", (0.0, 10.0, 20.0, 30.0, 45.0)),),
+    "interfacedlambertian": (
+        ({"type": "interfacedlambertian", "diffuse_reflectance": RED}, "alpha", (0.02, 0.1, 0.3, 0.6, 1.0)),
+        ({"type": "interfacedlambertian", "diffuse_reflectance": RED}, "int_ior", (1.0003, 1.1, 1.3, 1.5, 2.0)),
+    ),
+    "twoscale": (
+        ({"type": "twoscale", "material": "Ni_palik", "alpha": 0.05}, "sigma_s", (0.0, 0.01, 0.02, 0.04, 0.08)),
+        ({"type": "twoscale", "material": "Ni_palik", "alpha": 0.05, "sigma_s": 0.0}, "p", (0.3, 0.5, 0.7, 1.0, 1.5)),
+    ),
+}
+"""What a parameter does: a material, the parameter, and its values."""
 STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", "dirty-weave")
 
 
@@ -57,22 +99,22 @@ def between(page: str, begin: str, text: str, end: str) -> str:
 
 
 def speed_table(name: str, report: dict) -> str:
-    """Times of a model's calls and frames, in Markdown, from what `benchmarks/speed.py --json` wrote."""
+    """What a model costs, in Markdown, from what `asperity bench --json` wrote."""
     rows = {row: found for row, found in report["rows"].items() if row.split(",")[0] == name}
+    if not rows:
+        return "Not timed yet."
     reference = next(iter(rows.values()))["against"]
-    heads = [f"`{call}`, ns" for call in CALLS] + [f"frame, *{scene}*" for scene in FRAMES]
+    rows = {reference: report["rows"][reference], **rows}
+    more = {head: cell for head, (column, cell) in MORE.items() if column in rows[reference]}
+    heads = [f"`{call}`, ns" for call in CALLS] + [f"frame, *{scene}*" for scene in FRAMES] + list(more)
     lines = ["| | " + " | ".join(heads) + " |", "|" + "---|" * (len(heads) + 1)]
-    for row, found in {reference: report["rows"][reference], **rows}.items():
+    for row, found in rows.items():
         times = [found[call]["time"][1] for call in CALLS]
         cells = [f"{time:.0f}" if time > 10 else f"{time:.2g}" for time in times]
         cells += ["1" if row == reference else spread(found[scene]["ratio"]) for scene in FRAMES]
+        cells += [cell(found) for cell in more.values()]
         lines.append(f"| {row if row == reference else row.removeprefix(f'{name}, ')} | " + " | ".join(cells) + " |")
-    note = (
-        "`python benchmarks/speed.py`, one process, {threads} threads of {machine}: medians of {rounds} rounds in "
-        "which all take turns, ± half the distance of the quartiles. Frames of {size} x {size} pixels over those of "
-        "the first row; calls by the lane, of {lanes} random directions. Mitsuba {mitsuba}, Dr.Jit {drjit}, LLVM "
-        "{llvm}; commit {commit}."
-    )
+    note = NOTE + (NOTE_OF_MORE if more else "") + CIRCUMSTANCES
     return "\n".join([*lines, "", fill(note.format(**report), 120)])
 
 
@@ -80,6 +122,11 @@ def spread(quartiles: list[float]) -> str:
     """Median and half the distance of the others."""
     low, middle, high = quartiles
     return f"{middle:.2f} ± {(high - low) / 2:.2f}"
+
+
+def noise(frame: dict) -> str:
+    """Ratios of variance, and of variance times time."""
+    return f"{frame['noise'][1]:.2g} ({frame['work'][1]:.2g})"
 
 
 def with_speed(page: str, name: str, report: dict) -> str:
@@ -128,6 +175,37 @@ def strip(path: Path, size: int = 256, spp: int = 256) -> None:
         scene = preview(preset.material, **preset.preview, size=(size, size), spp=spp)
         images.append(np.asarray(mi.render(mi.load_dict(scene, parallel=False))))
     mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)[..., :3]), write_async=False)
+
+
+def sweeps(name: str) -> str:
+    """The pictures of a model's sweeps, with their values, in Markdown."""
+    return "\n\n".join(
+        f"`{parameter}` " + ", ".join(f"{value:g}" for value in values) + ":\n\n"
+        f"![Spheres of {name} by {parameter}](pictures/sweeps/{name}-{parameter}.png)"
+        for _, parameter, values in SWEEPS[name]
+    )
+
+
+def with_sweeps(page: str, name: str) -> str:
+    """The page with the sweeps of the model ``name`` between the marks."""
+    return between(page, BEGIN_SWEEPS, sweeps(name), END_SWEEPS)
+
+
+def draw_sweeps(folder: Path, size: int = 128, spp: int = 256) -> None:
+    """A row of spheres for each sweep."""
+    import mitsuba as mi
+    import numpy as np
+
+    from asperity.scenes.preview import preview
+
+    mi.set_variant("llvm_ad_rgb")
+    for name, parameter, material, values in ((n, p, m, v) for n, found in SWEEPS.items() for m, p, v in found):
+        scenes = [
+            preview({**material, parameter: value}, object="sphere", size=(size, size), spp=spp) for value in values
+        ]
+        images = [np.asarray(mi.render(mi.load_dict(scene, parallel=False)))[..., :3] for scene in scenes]
+        path = folder / f"{name}-{parameter}.png"
+        mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)), write_async=False)
 
 
 def linear(patch: str) -> list[float]:
@@ -187,15 +265,16 @@ def main() -> None:
     import asperity  # noqa: F401  (before Mitsuba)
     from asperity.models import MODELS
 
-    report = json.loads(SPEED.read_text())  # by `python benchmarks/speed.py --json docs/speed.json`
+    report = json.loads(SPEED.read_text())  # by `asperity bench --json docs/speed.json --force`
     for name, model in MODELS.items():
         page = DOCS / f"{name}.md"
-        page.write_text(with_speed(with_table(page.read_text(), model), name, report))
+        page.write_text(with_sweeps(with_speed(with_table(page.read_text(), model), name, report), name))
     page = DOCS / "which.md"
     page.write_text(between(page.read_text(), BEGIN_KEPT, kept_table(), END_KEPT))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         figures(DOCS / "pictures")
+        draw_sweeps(DOCS / "pictures" / "sweeps")
         patches(DOCS / "pictures" / "macbeth.png")
 
 

@@ -6,6 +6,7 @@ describes itself in (`pages.py`) are written when the build begins.
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -43,15 +44,29 @@ html_show_sourcelink = False
 html_copy_source = False
 
 
+FUNCTION = "<mi>(?:sin|cos|ln|atan2)</mi>"
+SPACE = '<mspace width="0.17em"/>'
+
+
+def mathml(node: Any, display: str) -> str:
+    """A formula, with spaces around functions, and bars that do not stretch, which the converter leaves out."""
+    text = converter.convert(node.astext(), display=display)
+    text = re.sub(f"({FUNCTION})(?=<m(?:i|n|sub|sup|frac)>)", rf"\1{SPACE}", text)
+    text = re.sub(f"(?<=</mi>|</mn>)(?=(?:<msup>)?{FUNCTION})", SPACE, text)
+    return re.sub(
+        r"<mo[^>]*>(?:&#x0007C;|&#x02223;|\|)</mo>", '<mo stretchy="false" lspace="0" rspace="0">|</mo>', text
+    )
+
+
 def formula_in_line(writer: Any, node: Any) -> None:
     """Write a formula within a line, as MathML."""
-    writer.body.append(converter.convert(node.astext()))
+    writer.body.append(mathml(node, "inline"))
     raise SkipNode  # its text has been written
 
 
 def formula_apart(writer: Any, node: Any) -> None:
     """Write a formula in a line of its own, as MathML."""
-    writer.body.append(f'<div class="formula">{converter.convert(node.astext(), display="block")}</div>')
+    writer.body.append(f'<div class="formula">{mathml(node, "block")}</div>')
     raise SkipNode
 
 

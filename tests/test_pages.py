@@ -1,5 +1,6 @@
 """The site: what it says of the code comes from the code, and what it tells a reader to do works."""
 
+import importlib
 import re
 import shlex
 import sys
@@ -8,7 +9,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from asperity import loading
 from asperity.cli import COMMANDS, app
+from asperity.models import MODELS
 from asperity.scenes import presets
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -57,6 +60,17 @@ def test_a_page_can_be_followed(name, tmp_path, monkeypatch):
                 run(line)
 
 
+@pytest.mark.parametrize(
+    "path", [*(DOCS / f"{name}.md" for name in MODELS), DOCS.parent / "README.md"], ids=lambda path: path.stem
+)
+def test_materials_of_a_page_load(path, rgb):
+    for language, text, _ in blocks(path.read_text()):
+        if language == "python" and text.startswith("{"):
+            loading.load(eval(text))
+        elif language == "python":
+            exec(text, {})
+
+
 def test_the_page_of_commands_has_all_commands_and_options():
     from typer.main import get_command
 
@@ -75,6 +89,30 @@ def test_the_page_of_checks_has_all_checks_in_their_order():
     from asperity.lab.checks import NAMES
 
     assert re.findall(r"^\| `(.*?)` \|", (DOCS / "checks.md").read_text(), re.MULTILINE) == list(NAMES)
+
+
+PAPERS = sorted(path.stem for path in (DOCS / "papers").glob("*.md") if path.stem != "index")
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_evidence_exists(name):
+    """Tests by the names that tables give, and what they call by module and name."""
+    page = (DOCS / "papers" / f"{name}.md").read_text()
+    tests = {
+        found
+        for path in DOCS.parent.rglob("tests/**/test_*.py")
+        for found in re.findall(r"^def (test_\w+)", path.read_text(), re.M)
+    }
+    assert set(re.findall(r"`(test_\w+)`", page)) - tests == set()
+    for module, function in re.findall(r"`([a-z]\w*)\.([A-Za-z]\w*)`", page):
+        if function != "py":
+            assert hasattr(importlib.import_module(f"asperity.models.{name}.{module}"), function), (module, function)
+
+
+def test_every_paper_has_its_page():
+    from asperity.models import with_microgeometry
+
+    assert {"twoscale", *with_microgeometry()} - set(PAPERS) == set()
 
 
 def test_the_gallery_has_all_presets_and_pictures_that_exist():

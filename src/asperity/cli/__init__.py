@@ -9,7 +9,7 @@ import typer
 
 from asperity import __version__
 
-from . import check, cite, compare, doctor, list, measure, merge, plot, render, reproduce, show, validate
+from . import bench, check, cite, compare, doctor, list, measure, merge, plot, render, reproduce, show, validate
 from .errors import OneLineErrors
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -24,6 +24,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "merge": merge.merge,
     "validate": validate.validate,
     "reproduce": reproduce.reproduce,
+    "bench": bench.bench,
     "doctor": doctor.doctor,
 }
 """In the order of the help."""

@@ -110,7 +110,7 @@ def sample_visible_normal(r: Any, w: Any, u: Any, v: Any) -> Any:
     """Point m' on the unit hemisphere that is visible from ``w``, distributed by visible area (all in sphere space).
 
     The density over normals m is tau_0 D(m) G1dist(w, h') (i.m)+ / (cos_i tau_i). Exact: first the height, then the
-    azimuth about ``w``, either by inverting its distribution (docs/micrograin.md, "Derivations"). ``u``, ``v`` in
+    azimuth about ``w``, either by inverting its distribution (docs/papers/micrograin.md). ``u``, ``v`` in
     [0, 1).
     """
     sin, cos = inclination(w)

@@ -2,8 +2,8 @@
 
 All areas live in the *sphere space* where every grain is a unit hemisphere: directions are stretched by
 E = diag(beta_x, beta_y, 1), see `to_sphere`. A shadow is cast on the plane at height ``h`` in [0, 1] above the base.
-Formulas are the appendices A and B of the paper with its errata mended and without case distinctions: see "Derivations"
-in docs/micrograin.md. Arguments are Dr.Jit arrays of any precision, or plain floats; directions have ``x``, ``y``,
+Formulas are the appendices A and B of the paper with its errata mended and without case distinctions: derived in
+docs/papers/micrograin.md. Arguments are Dr.Jit arrays of any precision, or plain floats; directions have ``x``, ``y``,
 ``z``.
 
 ========================  ==================  ==========================================================================

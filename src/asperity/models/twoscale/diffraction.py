@@ -3,7 +3,7 @@
 It has the rms height sigma_s and the power spectrum of K-correlation, with the correlation length b and the exponent
 c > 1 (generalised Harvey and Shack's theory). All depends on the cosine cos_d between either direction and
 the half vector h, on h, and on the wavelength lambda, by B = b / lambda. Lengths are in micrometres, equations those of
-Holzschuch and Pacanowski 2017; what the paper leaves open is settled in docs/twoscale.md.
+Holzschuch and Pacanowski 2017; what the paper leaves open is settled in docs/papers/twoscale.md.
 
 A facet m keeps A of the light in the mirror direction, and spreads 1 - A around it by
 
