@@ -27,7 +27,7 @@ def test_a_measurement_has_its_own(rgb, measured):
 
 
 def test_lobes_add_up(rgb):
-    """The mirror and the body of a plastic; both are estimated by samples of their own: 4096, so within a percent."""
+    """The mirror and the body of a plastic; both are estimated by samples of their own: 8192, so within a percent."""
     parts = parts_of(PLASTIC, 0)
     assert list(parts) == ["lobe 1: mirror", "lobe 2: diffuse"]
     whole = over_incidence(PLASTIC, 0).value

@@ -17,7 +17,7 @@ from .values import Curve
 
 GRID = np.append(np.arange(0, 89, 2.0), [89.0, 89.7])
 """θi of the curves, in degrees."""
-SAMPLES = 2**12
+SAMPLES = 2**13
 """For each value."""
 
 

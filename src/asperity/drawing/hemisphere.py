@@ -20,6 +20,8 @@ from . import style, values
 
 SIZE = 320
 """Pixels along a side of a map."""
+MANY = 300
+"""Ratio of the ends of a logarithmic scale from which on isolines are sparse."""
 RINGS = (30, 60)
 """Degrees from the normal that are marked."""
 
@@ -154,7 +156,8 @@ def disc(axes: Axes, map: np.ndarray, norm: Normalize, incident: np.ndarray, col
 def lines(axes: Axes, map: np.ndarray, norm: Normalize) -> None:
     """Draw isolines, with their values."""
     low, high = norm.vmin, norm.vmax
-    locator = LogLocator(10, (1.0, 2.0, 5.0)) if isinstance(norm, LogNorm) else MaxNLocator(6)
+    steps = (1.0, 3.0) if high / low > MANY else (1.0, 2.0, 5.0)
+    locator = LogLocator(10, steps) if isinstance(norm, LogNorm) else MaxNLocator(6)
     levels = [level for level in locator.tick_values(low, high) if low < level < high]
     place = (np.arange(SIZE) + 0.5) / SIZE * 2 - 1
     drawn = axes.contour(place, place, map, levels=levels, colors="white", linewidths=0.5)
