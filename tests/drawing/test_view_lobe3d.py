@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from mpl_toolkits.mplot3d import Axes3D
 
-from asperity.drawing import plot
+from asperity.drawing import lobe3d, plot
 from asperity.goniophotometer.sensors import directions
 
 
@@ -35,3 +35,12 @@ def test_gold_points_to_the_mirrored_direction(rgb, surfaces):
         points = points.reshape(3, -1)
         tip = points[:, np.linalg.norm(points, axis=0).argmax()]
         assert tip == pytest.approx(directions([(theta, 210)])[0], abs=0.03)
+
+
+def test_the_mesh_is_fine_where_a_mirror_sends_light():
+    """And reaches all azimuths: within half a step there, and three degrees elsewhere."""
+    for azimuth, step in ((250, lobe3d.FINE), (70, lobe3d.STEP)):
+        cosine = (lobe3d.mesh(40, 70) @ directions([(40, azimuth)])[0]).max()
+        assert np.degrees(np.arccos(min(cosine, 1))) <= step / 2 + 1e-3
+    points = np.sort((lobe3d.mesh(40, 70) @ directions([(40, 250)])[0]).ravel())
+    assert (np.degrees(np.arccos(np.clip(points, -1, 1))) < 5).sum() > 100

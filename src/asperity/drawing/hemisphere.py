@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import Locator, LogLocator, MaxNLocator
 
 from asperity.errors import ParameterError
 from asperity.goniophotometer import Hemisphere
@@ -156,8 +156,10 @@ def disc(axes: Axes, map: np.ndarray, norm: Normalize, incident: np.ndarray, col
 def lines(axes: Axes, map: np.ndarray, norm: Normalize) -> None:
     """Draw isolines, with their values."""
     low, high = norm.vmin, norm.vmax
-    steps = (1.0, 3.0) if high / low > MANY else (1.0, 2.0, 5.0)
-    locator = LogLocator(10, steps) if isinstance(norm, LogNorm) else MaxNLocator(6)
+    if isinstance(norm, LogNorm):
+        locator: Locator = LogLocator(10, (1.0, 3.0) if high / low > MANY else (1.0, 2.0, 5.0))
+    else:
+        locator = MaxNLocator(6)
     levels = [level for level in locator.tick_values(low, high) if low < level < high]
     place = (np.arange(SIZE) + 0.5) / SIZE * 2 - 1
     drawn = axes.contour(place, place, map, levels=levels, colors="white", linewidths=0.5)
