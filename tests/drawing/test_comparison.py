@@ -8,6 +8,7 @@ from asperity import drawing
 from asperity.drawing import hemisphere
 from asperity.drawing.comparison import Previews, compare
 from asperity.errors import ParameterError
+from asperity.goniophotometer import Window
 from asperity.materials import Material
 
 
@@ -33,6 +34,13 @@ def test_a_measurement_is_compared_in_its_own_cells(rgb, measured):
     other = compare(lambertian(0.3), measured, ("a", "b"))
     assert other.mean_relative == pytest.approx(1, rel=1e-5) and other.albedo_difference == pytest.approx([0.3] * 3)
     assert drawn(measured, lambertian(0.3))
+
+
+def test_a_window_has_no_maps(rgb):
+    window = Material("window", measured=measurement(sensor=Window("retro", 10, 6), angles=((30, 0),)))
+    found = compare(window, lambertian(REFLECTANCE), ("a", "b"))
+    assert found.mean_relative < 1e-5 and found.outgoing.shape == (1, 36, 2)
+    assert not any(axes.images for axes in drawn(window, lambertian(0.3)).axes)
 
 
 def test_two_measurements(rgb, measured):

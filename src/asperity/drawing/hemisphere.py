@@ -15,6 +15,7 @@ from matplotlib.ticker import Locator, LogLocator, MaxNLocator
 from asperity.errors import ParameterError
 from asperity.goniophotometer import Hemisphere
 from asperity.goniophotometer.sensors import directions
+from asperity.materials import Material
 
 from . import style, values
 
@@ -27,7 +28,7 @@ RINGS = (30, 60)
 
 
 def figure(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     *,
     theta: Sequence[float] | None = None,
     phi: float = 0.0,
@@ -95,7 +96,7 @@ def pixels() -> np.ndarray:
 
 
 def over_disc(
-    material: Any, incident: np.ndarray, cosine: bool = True, wavelengths: Sequence[float] | None = None
+    material: Material, incident: np.ndarray, cosine: bool = True, wavelengths: Sequence[float] | None = None
 ) -> np.ndarray:
     """f |cos θo|, or f, at `pixels`: (channels, directions of incidence, SIZE, SIZE), NaN outside the disc."""
     wo = pixels()
@@ -109,14 +110,15 @@ def over_disc(
     return result
 
 
-def _measured_cells(material: Any, incident: np.ndarray, wo: np.ndarray) -> np.ndarray:
+def _measured_cells(material: Material, incident: np.ndarray, wo: np.ndarray) -> np.ndarray:
     """Values of the cells that directions (n, 3) fall into: (channels, directions of incidence, n)."""
-    sensor = material.measured.sensor
+    measured = values.measurement(material)
+    sensor = measured.sensor
     if not isinstance(sensor, Hemisphere):
         raise ParameterError(f"{material.name}: a {sensor.kind} was measured, not the hemisphere.")
     cell = cells(wo, sensor.rows, sensor.columns)
     chosen = [values.row(material, tuple(one)) for one in incident]
-    return np.moveaxis(material.measured.summed.value[chosen][:, cell], -1, 0)
+    return np.moveaxis(measured.summed.value[chosen][:, cell], -1, 0)
 
 
 def cells(wo: np.ndarray, rows: int, columns: int) -> np.ndarray:
