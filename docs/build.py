@@ -7,8 +7,12 @@ file); the pictures on request: they take three minutes.
 from __future__ import annotations
 
 import json
+import re
+import shlex
+import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from textwrap import fill
 
 DOCS = Path(__file__).parent
@@ -42,6 +46,8 @@ INDICES = (1.0, 1.2, 1.33, 1.5)
 WHITE = {"type": "rgb", "value": 1.0}
 PAINT = {"type": "interfacedlambertian", "diffuse_reflectance": WHITE}
 GRAINS = {"type": "micrograin", "tau_0": 0.5, "base": {"type": "diffuse", "reflectance": WHITE}}
+LARGEST = 60_000
+"""Bytes of a picture on the page of plots."""
 KEPT = (
     ("`roughconductor`", {"type": "roughconductor", "distribution": "ggx", "material": "none"}, "alpha"),
     ("`vgroove`", {"type": "vgroove", "material": "none"}, "alpha"),
@@ -260,6 +266,30 @@ def figures(folder: Path) -> None:
     save(lambertsphere.ball(report.Effort(4e6, 32)).figures["ball"], folder / "ball.png")
 
 
+def plots(folder: Path, page: Path = DOCS / "plotting.md") -> None:
+    """The pictures below the commands of a page: those that these write, made smaller."""
+    shown = re.compile(r"^```sh\n(.*?)^```\n(?:\n!\[.*?\]\(pictures/(.*?)\))?", re.MULTILINE | re.DOTALL)
+    with TemporaryDirectory() as place:
+        for commands, picture in shown.findall(page.read_text()):
+            for command in commands.splitlines():
+                line = [sys.executable, "-m", *shlex.split(command), *(["--force"] if picture else [])]
+                written = subprocess.run(line, cwd=place, check=True, stdout=subprocess.PIPE, text=True).stdout
+            if picture:
+                shrink(Path(place, written.split()[-1]), folder / picture)
+
+
+def shrink(source: Path, target: Path) -> None:
+    """Write a picture in 256 colours, half as wide, or narrower, until it is no larger than `LARGEST`."""
+    from PIL import Image
+
+    image = Image.open(source).convert("RGB")
+    for factor in (2, 2.4, 2.8, 3.2, 3.6):
+        size = round(image.width / factor), round(image.height / factor)
+        image.resize(size, Image.Resampling.LANCZOS).quantize(256).save(target, optimize=True)
+        if target.stat().st_size <= LARGEST:
+            return
+
+
 def main() -> None:
     """Write the tables, and the pictures if asked."""
     import asperity  # noqa: F401  (before Mitsuba)
@@ -274,6 +304,7 @@ def main() -> None:
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         figures(DOCS / "pictures")
+        plots(DOCS / "pictures")
         draw_sweeps(DOCS / "pictures" / "sweeps")
         patches(DOCS / "pictures" / "macbeth.png")
 
