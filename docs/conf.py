@@ -25,7 +25,8 @@ import asperity
 pages.write(DOCS / pages.FOLDER)  # before the extensions look for the bibliography
 
 project = "asperity"
-author = "the authors of asperity"
+author = "the asperity authors"
+copyright = "the asperity authors, BSD-3-Clause"
 version = release = asperity.__version__
 
 extensions = ["myst_parser", "sphinxcontrib.bibtex", "sphinx_copybutton"]

@@ -70,11 +70,13 @@ def entry(preset: Any) -> str:
     from asperity.scenes import presets
 
     material = json.loads((presets.FOLDER / f"{preset.name}.json").read_text())["material"]
+    shown = picture(preset)
     return "\n".join(
         [
             f"(preset-{preset.name})=",
             f"### {preset.title}",
             "",
+            f":::{{container}} preset\n{shown}\n:::\n" if shown else "",
             f"{preset.about} *{preset.source}.*",
             "",
             f"```sh\nasperity render --preset {preset.name}\n```",
