@@ -19,8 +19,8 @@ import numpy as np
 from baselines import register
 from rich.console import Console
 from rich.table import Table
-from speed import finish, medians
 
+from asperity.lab.bench.timing import finish, medians
 from asperity.scenes.preview import preview
 
 SETS = {  # (tau_0, beta_x, beta_y): elevations in degrees; the table of the model's notes, section 6

@@ -18,6 +18,24 @@ BEGIN_KEPT, END_KEPT = "<!-- kept: made by docs/build.py -->", "<!-- end of kept
 SPEED = DOCS / "speed.json"
 CALLS, FRAMES = ("eval_pdf", "sample"), ("bare", "preview", "filled")
 """Columns of `speed.json`: nanoseconds, and seconds."""
+MORE = {
+    "first picture, s": ("first", lambda found: f"{found['first']['time'][1]:.1f}"),
+    "memory, MiB": ("memory", lambda found: f"{found['memory']['value'][1]:.0f}"),
+    "noise, *environment*": ("point", lambda found: noise(found["filled"])),
+    "noise, *point*": ("point", lambda found: noise(found["point"])),
+}
+"""What newer files have too: the column that says so, and what is told of it."""
+NOTE = (
+    "`asperity bench`, one process, {threads} threads of {machine}: medians of {rounds} rounds in which all take "
+    "turns, ± half the distance of the quartiles. Frames of {size} x {size} pixels over those of the first row; calls "
+    "by the lane, of {lanes} random directions. "
+)
+NOTE_OF_MORE = (
+    "The first picture is that of a new process without compiled code, with the most memory that it takes. Noise is "
+    "the variance of pixels at equal samples over that of the first row, of *filled* under its environment map and of "
+    "*bare* by its point light alone; in brackets it is multiplied by the time of the frame. "
+)
+CIRCUMSTANCES = "Mitsuba {mitsuba}, Dr.Jit {drjit}, LLVM {llvm}; commit {commit}."
 MACBETH = {"orange": (214, 126, 44), "blue flower": (133, 128, 177), "bluish green": (103, 189, 170)}
 """Patches of the ColorChecker, as its maker gives them: sRGB of 8 bits."""
 INDICES = (1.0, 1.2, 1.33, 1.5)
@@ -81,22 +99,22 @@ def between(page: str, begin: str, text: str, end: str) -> str:
 
 
 def speed_table(name: str, report: dict) -> str:
-    """Times of a model's calls and frames, in Markdown, from what `benchmarks/speed.py --json` wrote."""
+    """What a model costs, in Markdown, from what `asperity bench --json` wrote."""
     rows = {row: found for row, found in report["rows"].items() if row.split(",")[0] == name}
+    if not rows:
+        return "Not timed yet."
     reference = next(iter(rows.values()))["against"]
-    heads = [f"`{call}`, ns" for call in CALLS] + [f"frame, *{scene}*" for scene in FRAMES]
+    rows = {reference: report["rows"][reference], **rows}
+    more = {head: cell for head, (column, cell) in MORE.items() if column in rows[reference]}
+    heads = [f"`{call}`, ns" for call in CALLS] + [f"frame, *{scene}*" for scene in FRAMES] + list(more)
     lines = ["| | " + " | ".join(heads) + " |", "|" + "---|" * (len(heads) + 1)]
-    for row, found in {reference: report["rows"][reference], **rows}.items():
+    for row, found in rows.items():
         times = [found[call]["time"][1] for call in CALLS]
         cells = [f"{time:.0f}" if time > 10 else f"{time:.2g}" for time in times]
         cells += ["1" if row == reference else spread(found[scene]["ratio"]) for scene in FRAMES]
+        cells += [cell(found) for cell in more.values()]
         lines.append(f"| {row if row == reference else row.removeprefix(f'{name}, ')} | " + " | ".join(cells) + " |")
-    note = (
-        "`python benchmarks/speed.py`, one process, {threads} threads of {machine}: medians of {rounds} rounds in "
-        "which all take turns, ± half the distance of the quartiles. Frames of {size} x {size} pixels over those of "
-        "the first row; calls by the lane, of {lanes} random directions. Mitsuba {mitsuba}, Dr.Jit {drjit}, LLVM "
-        "{llvm}; commit {commit}."
-    )
+    note = NOTE + (NOTE_OF_MORE if more else "") + CIRCUMSTANCES
     return "\n".join([*lines, "", fill(note.format(**report), 120)])
 
 
@@ -104,6 +122,11 @@ def spread(quartiles: list[float]) -> str:
     """Median and half the distance of the others."""
     low, middle, high = quartiles
     return f"{middle:.2f} ± {(high - low) / 2:.2f}"
+
+
+def noise(frame: dict) -> str:
+    """Ratios of variance, and of variance times time."""
+    return f"{frame['noise'][1]:.2g} ({frame['work'][1]:.2g})"
 
 
 def with_speed(page: str, name: str, report: dict) -> str:
@@ -242,7 +265,7 @@ def main() -> None:
     import asperity  # noqa: F401  (before Mitsuba)
     from asperity.models import MODELS
 
-    report = json.loads(SPEED.read_text())  # by `python benchmarks/speed.py --json docs/speed.json`
+    report = json.loads(SPEED.read_text())  # by `asperity bench --json docs/speed.json --force`
     for name, model in MODELS.items():
         page = DOCS / f"{name}.md"
         page.write_text(with_sweeps(with_speed(with_table(page.read_text(), model), name, report), name))

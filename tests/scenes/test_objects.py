@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from geometry import area_vectors, corners, tangents, uv_areas
 
-from asperity.scenes.objects import OBJECTS, knot, pawn, sphere
+from asperity.scenes.objects import OBJECTS, ball, knot, pawn, sphere
 
 
 @pytest.fixture(params=OBJECTS)
@@ -30,7 +30,7 @@ def test_stands_on_the_ground_and_fits_the_picture(mesh):
     assert np.abs([low[:2], high[:2]]).max() < 1.2
 
 
-@pytest.mark.parametrize("mesh", [pawn(24, 90), sphere(24, 12), knot(90, 12)])
+@pytest.mark.parametrize("mesh", [pawn(24, 90), sphere(24, 12), knot(90, 12), ball(96, 240)])
 def test_is_closed_and_faces_outwards(mesh):
     _, welded = np.unique(mesh.vertices.round(7) + 0.0, axis=0, return_inverse=True)
     faces = welded.ravel()[mesh.faces]

@@ -11,7 +11,7 @@ import pytest
 from asperity.errors import UnknownNameError, UnreadableFileError
 from asperity.lab import evaluate
 from asperity.scenes import presets
-from asperity.scenes.preview import ENVIRONMENTS, preview
+from asperity.scenes.preview import ENVIRONMENTS, FLOORS, LIGHTS, preview
 from asperity.scenes.objects import OBJECTS
 
 DIFFUSE = {"type": "diffuse"}
@@ -75,9 +75,9 @@ def test_says_what_it_is_and_shows_itself(name):
     assert preset.title
     assert preset.source
     assert 40 < len(preset.about) < 200
-    assert preset.preview.keys() == {"object", "env"}
-    assert preset.preview["object"] in OBJECTS
-    assert preset.preview["env"] in ENVIRONMENTS
+    assert {"object", "env"} <= preset.preview.keys()
+    names = {"object": OBJECTS, "env": ENVIRONMENTS, "light": LIGHTS, "floor": FLOORS}
+    assert [key for key, value in preset.preview.items() if value not in names[key]] == []
 
 
 def test_the_default_is_a_preset():
@@ -135,7 +135,10 @@ def test_files_are_found_beside_the_description_and_matrices_scale_them(tmp_path
         ({"material": {"reflectance": 0.5}}, "it has no BSDF"),
         ({"type": 3}, "it has no BSDF"),
         ({"material": DIFFUSE, "previw": {}}, "unknown key 'previw'. Did you mean 'preview'"),
-        ({"material": DIFFUSE, "preview": {"enviroment": "sky"}}, "unknown key 'enviroment'.*Allowed: object, env"),
+        (
+            {"material": DIFFUSE, "preview": {"enviroment": "sky"}},
+            "unknown key 'enviroment'.*Allowed: object, env, ",
+        ),
         ({"material": DIFFUSE, "preview": {"object": 3}}, "preview.object is 3, not a name or the path of a file"),
         ({"material": DIFFUSE, "preview": {"env": None}}, "preview.env is null, not a name"),
         (b"[" * 100_000, "nested too deep"),

@@ -9,7 +9,7 @@ import typer
 
 from asperity import __version__
 
-from . import check, cite, doctor, list, measure, merge, plot, render, reproduce, show, validate
+from . import bench, check, cite, compare, doctor, list, measure, merge, plot, render, reproduce, show, validate
 from .errors import OneLineErrors
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -20,9 +20,11 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "check": check.check,
     "measure": measure.measure,
     "plot": plot.plot,
+    "compare": compare.compare,
     "merge": merge.merge,
     "validate": validate.validate,
     "reproduce": reproduce.reproduce,
+    "bench": bench.bench,
     "doctor": doctor.doctor,
 }
 """In the order of the help."""

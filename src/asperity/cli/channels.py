@@ -47,21 +47,26 @@ def names(scene: Any, channels: int, sensor: int = 0) -> list[str]:
     return found if len(found) == channels else colours + [f"channel {n}" for n in range(len(colours), channels)]
 
 
+def kind(names: list[str]) -> str:
+    """The key of COLOURS for what the names begin with; Y if they are no colours."""
+    # XYZ are colours if the film names them so; those of an AOV are a position or a normal.
+    letters = "".join(name if len(name) == 1 else name[-1].lower() for name in names)
+    return next((kind for kind in COLOURS if letters.startswith(kind)), "Y")
+
+
 def png(image: np.ndarray, names: list[str]) -> Any:
     """The ``mi.Bitmap`` for a PNG: the colours in sRGB, clipped at 1; the first channel in grey if they are none."""
     import mitsuba as mi
     import numpy as np
 
     formats, transforms = mi.Bitmap.PixelFormat, mi.Bitmap.AlphaTransform
-    # XYZ are colours if the film names them so; those of an AOV are a position or a normal.
-    letters = "".join(name if len(name) == 1 else name[-1].lower() for name in names)
-    kind = next((kind for kind in COLOURS if letters.startswith(kind)), "Y")
-    bitmap = mi.Bitmap(np.ascontiguousarray(image[..., : len(kind)]), getattr(formats, kind.upper()))
+    found = kind(names)
+    bitmap = mi.Bitmap(np.ascontiguousarray(image[..., : len(found)]), getattr(formats, found.upper()))
     return bitmap.convert(
-        pixel_format=getattr(formats, COLOURS[kind]),
+        pixel_format=getattr(formats, COLOURS[found]),
         component_format=mi.Struct.Type.UInt8,
         srgb_gamma=True,
-        alpha_transform=transforms.Unpremultiply if kind.endswith("A") else transforms.Empty,
+        alpha_transform=transforms.Unpremultiply if found.endswith("A") else transforms.Empty,
     )
 
 

@@ -2,35 +2,129 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asperity.files import atomically
+from asperity.errors import ParameterError, refuse_unused
+from asperity.materials import resolve
 
-from . import console, output, variants
+from . import console, materials, output, variants
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from asperity.materials import Material
 
 FORMATS = (".png", ".pdf", ".svg")
+VIEW, SPECTRAL = "lobes", "llvm_ad_spectral"
+
+
+def numbers(name: str) -> Callable[[str], list[float]]:
+    """A parser of numbers between commas, for the option of this name."""
+
+    def parse(text: str) -> list[float]:
+        try:
+            return [float(number) for number in text.split(",")]
+        except ValueError:
+            raise typer.BadParameter(f"{name} {text!r}: expected numbers, such as 0,30,60.") from None
+
+    return parse
 
 
 def plot(
     ctx: typer.Context,
-    file: Annotated[Path, typer.Argument(metavar="NPZ", help="What `asperity measure` wrote.")],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="PNG, PDF or SVG; FILE.png if left out.")] = None,
-    model: Annotated[bool, typer.Option(help="Draw the model's own values as well, if it is a model's.")] = True,
+    given: Annotated[
+        list[str],
+        typer.Argument(metavar="MATERIAL...", help="Presets, BSDFs, files, JSON; measurements."),
+    ],
+    view: Annotated[
+        str | None,
+        typer.Option(
+            help="lobes, slices, hemisphere, rusinkiewicz, albedo, lobe3d, spectrum, sampling. If left out: lobes; "
+            "of one measurement, all that was measured."
+        ),
+    ] = None,
+    theta: Annotated[
+        Any, typer.Option(parser=numbers("--theta"), metavar="DEGREES,...", help="Angles of incidence: 0,30,60.")
+    ] = None,
+    phi: Annotated[float | None, typer.Option(metavar="DEGREES", help="Azimuth of incidence.")] = None,
+    scale: Annotated[str | None, typer.Option(help="linear or log.")] = None,
+    cosine: Annotated[bool, typer.Option("--cosine/--no-cosine", help="f cos θo, or f.")] = True,
+    channel: Annotated[str | None, typer.Option(help="mean, each, or the name of one: R.")] = None,
+    wavelengths: Annotated[
+        Any, typer.Option(parser=numbers("--wavelengths"), metavar="NM,...", help="Channels of spectral variants.")
+    ] = None,
+    isolines: Annotated[bool, typer.Option("--isolines", help="On maps of the hemisphere.")] = False,
+    parts: Annotated[bool | None, typer.Option(help="Lobes or orders of the albedo.")] = None,
+    theta_o: Annotated[
+        Any,
+        typer.Option(parser=numbers("--theta-o"), metavar="DEGREES,...", help="Of a spectrum; -45: to the light."),
+    ] = None,
+    phi_d: Annotated[float | None, typer.Option(metavar="DEGREES", help="Of the view rusinkiewicz.")] = None,
+    settings: materials.Settings = None,
+    model: Annotated[bool | None, typer.Option(help="Draw the model, too, that a whole measurement is of.")] = None,
+    variant: variants.Variant = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="PNG, PDF or SVG. Default: MATERIAL-VIEW.png.")
+    ] = None,
     force: output.Force = False,
 ) -> None:
-    """Plot a measurement: maps, their errors, slices through the plane of incidence, and the albedo."""
-    [out] = ctx.with_resource(output.files(out, file.parent / f"{file.stem or output.NAME}.png", FORMATS, force=force))
+    """Plot materials: their lobes, slices, maps, albedos, spectra or sampling; models and measurements together."""
+    options = {
+        "theta": theta, "phi": phi, "scale": scale, "cosine": None if cosine else False, "channel": channel,
+        "wavelengths": wavelengths, "isolines": isolines or None, "parts": parts, "theta_o": theta_o, "phi_d": phi_d,
+    }  # fmt: skip
+    options = {name: value for name, value in options.items() if value is not None}
+    whole = view is None and len(given) == 1 and is_measurement(given[0])
+    if whole:
+        refuse_unused(options, (), "a whole measurement: choose a --view")
+    elif model is not None:
+        raise ParameterError("model: makes no sense with a view. Name the model as another material.")
+    inputs = [one if is_text(one) else Path(one) for one in given] + list(settings or [])
+    default = default_path(given[0], None if whole else view or VIEW)
+    [path] = ctx.with_resource(output.files(out, default, FORMATS, force=force, inputs=inputs))
     with console.status("drawing"):
-        from asperity.goniophotometer import Measurement, plots
+        # Settings are of the first, so that a material can be drawn beside itself.
+        shown = [resolve(one, settings or [] if n == 0 else []) for n, one in enumerate(given)]
+        variants.choose(variant or (SPECTRAL if view == "spectrum" or wavelengths else suited(shown)))
+        from asperity import drawing
 
-        measured = Measurement.load(file)
-        description = measured.about.get("model") if model else None
-        if description is not None:
-            variants.choose(None if measured.mode == "rgb" else f"llvm_ad_{measured.mode}")
-        figure = plots.figure(measured, description)
-        with atomically(out) as part:
-            figure.savefig(part)
-    typer.echo(out)
+        if whole:
+            figure = measurement(shown[0].measured, model is not False)
+        else:
+            figure = drawing.plot(shown, view or VIEW, **options)
+        drawing.style.save(figure, path)
+    typer.echo(path)
+
+
+def is_measurement(given: str) -> bool:
+    """Whether an argument is a measurement of ours."""
+    return not is_text(given) and given.lower().endswith(".npz")
+
+
+def is_text(given: str) -> bool:
+    """Whether an argument is a description itself."""
+    return given.lstrip().startswith(("{", "[", "<"))
+
+
+def default_path(given: str, view: str | None) -> Path:
+    """Where the picture goes: beside a measurement, and named by the view, if there is one; else here."""
+    stem = "material" if is_text(given) else Path(given).stem or str(output.NAME)
+    folder = Path(given).parent if is_measurement(given) else Path()
+    return folder / (f"{stem}-{view}.png" if view else f"{stem}.png")
+
+
+def suited(shown: Sequence[Material]) -> str | None:
+    """The variant with the channels of the first measurement; None if any will do."""
+    modes = [material.measured.mode for material in shown if material.measured is not None]
+    return f"llvm_ad_{modes[0]}" if modes and modes[0] != "rgb" else None
+
+
+def measurement(measured: Any, model: bool) -> Figure:
+    """All that was measured; with the model's own values, if it is a model's and they are asked for."""
+    from asperity.goniophotometer import plots
+
+    return plots.figure(measured, measured.about.get("model") if model else None)

@@ -7,29 +7,36 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from asperity.errors import ParameterError, UnknownNameError, suggestion
+import mitsuba as mi
 
-from . import style
-from .albedo import albedo
-from .hemisphere import hemisphere
-from .lobe3d import lobe3d
-from .lobes import lobes
-from .rusinkiewicz import rusinkiewicz
-from .sampling import sampling
-from .slices import slices
-from .spectrum import spectrum
+from asperity.errors import ParameterError, UnknownNameError, suggestion
+from asperity.loading import short
+
+from . import albedo, comparison, hemisphere, lobe3d, lobes, rusinkiewicz, sampling, slices, spectrum, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from asperity.lab.compare import Comparison
     from asperity.materials import Material
 
+    from .comparison import Previews
+
 VIEWS: dict[str, Callable[..., Figure]] = {
-    view.__name__: view for view in (lobes, slices, hemisphere, rusinkiewicz, albedo, lobe3d, spectrum, sampling)
+    "lobes": lobes.figure,
+    "slices": slices.figure,
+    "hemisphere": hemisphere.figure,
+    "rusinkiewicz": rusinkiewicz.figure,
+    "albedo": albedo.figure,
+    "lobe3d": lobe3d.figure,
+    "spectrum": spectrum.figure,
+    "sampling": sampling.figure,
 }
 """Each takes materials and options by name, and gives a figure; the first line of its docstring says what it shows."""
-MEASURED = ("lobes", "slices", "hemisphere", "albedo")
+MEASURED = ("lobes", "slices", "hemisphere", "albedo", "comparison")
 """Views that draw what was measured itself; the others draw a BSDF that interpolates it."""
+ALL_LIGHT = ("albedo", "comparison")
+"""Where mirrors are seen, too."""
 
 
 def plot(materials: Sequence[Material], view: str = "lobes", **options: Any) -> Figure:
@@ -54,8 +61,17 @@ def plot(materials: Sequence[Material], view: str = "lobes", **options: Any) -> 
     known = option_names(view)
     for name in options.keys() - set(known):
         raise ParameterError(f"{name}: makes no sense with view {view}. {suggestion(name, known)}")
+    named = [replace(one, name=name) for one, name in zip(materials, distinct_names(materials))]
     with style.applied():
-        return VIEWS[view]([_loaded(material, view) for material in materials], **options)
+        return VIEWS[view]([_loaded(material, view) for material in named], **options)
+
+
+def compared(a: Material, b: Material, found: Comparison, previews: Previews | None = None) -> Figure:
+    """A figure of two materials side by side, ``a`` the reference, with what `comparison.compare` found of them."""
+    names = distinct_names([a, b])
+    with style.applied():
+        shown = [_loaded(replace(one, name=name), "comparison") for one, name in zip((a, b), names)]
+        return comparison.figure(shown, found, previews)
 
 
 def option_names(view: str) -> list[str]:
@@ -63,22 +79,41 @@ def option_names(view: str) -> list[str]:
     return [name for name in inspect.signature(VIEWS[view]).parameters if name != "materials"]
 
 
+def distinct_names(materials: Sequence[Material]) -> list[str]:
+    """What to call them: where names are the same, with the parameters that differ, or else their place."""
+    names = [material.name for material in materials]
+    result = []
+    for n, material in enumerate(materials):
+        alike = [one.description for one in materials if one.name == material.name]
+        if len(alike) == 1:
+            result.append(material.name)
+        elif any(one is None for one in alike):
+            result.append(f"{material.name} ({names[: n + 1].count(material.name)})")
+        else:
+            result.append(", ".join([material.name, *_differing(material.description, alike)]))
+    return result
+
+
+def _differing(description: Any, others: Sequence[Any]) -> list[str]:
+    """The parameters of a description that others have not, or have otherwise."""
+    keys = [key for key, value in description.items() if any(one.get(key, ...) != value for one in others)]
+    return [f"{key} = {short(description[key])}" for key in keys]
+
+
 def _loaded(material: Material, view: str) -> Material:
-    """The material, loaded once; a measurement as it is, for views that draw such."""
-    if material.measured is None:
-        return _drawable(replace(material, description=None, bsdf=material.load()), view)
-    if view in MEASURED:
+    """The material, loaded once, whose name says what of it is not drawn; a measurement as it is, if views draw such.
+
+    Raises ParameterError if nothing would be in the picture.
+    """
+    if material.measured is not None and view in MEASURED:
         return material
-    return replace(material, name=f"{material.name}, interpolated", bsdf=material.load(), measured=None)
-
-
-def _drawable(material: Material, view: str) -> Material:
-    """The material, whose name says if part of it is not in the picture; raises ParameterError if nothing would be."""
-    import mitsuba as mi
-
-    flags = material.bsdf.flags()
-    if view == "albedo" or not mi.has_flag(flags, mi.BSDFFlags.Delta):
-        return material
-    if not mi.has_flag(flags, mi.BSDFFlags.Smooth):
-        raise ParameterError(f"{material.name} is all mirror, or clear glass: its values are 0, and view albedo shows it.")
-    return replace(material, name=f"{material.name} without its mirror")
+    note = ", interpolated" if material.measured is not None else ""
+    bsdf = material.load()
+    flags = bsdf.flags()
+    if view not in ALL_LIGHT and mi.has_flag(flags, mi.BSDFFlags.Delta):
+        if not mi.has_flag(flags, mi.BSDFFlags.Smooth):
+            raise ParameterError(
+                f"{material.name} is all mirror, or clear glass: its values are 0, and view albedo shows it."
+            )
+        note = " without its mirror"
+    return replace(material, name=material.name + note, description=None, bsdf=bsdf, measured=None)

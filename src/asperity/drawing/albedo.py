@@ -13,7 +13,6 @@ from asperity.goniophotometer.sensors import check_angles, directions
 from asperity.lab import evaluate
 
 from . import curves, style, values
-from .curves import Line
 from .values import Curve
 
 GRID = np.append(np.arange(0, 89, 2.0), [89.0, 89.7])
@@ -22,7 +21,7 @@ SAMPLES = 2**12
 """For each value."""
 
 
-def albedo(
+def figure(
     materials: Sequence[Any],
     *,
     phi: float = 0.0,
@@ -34,20 +33,17 @@ def albedo(
     check_angles([(0, phi)])
     channels = values.pick(values.channels(materials, wavelengths), channel)
     made, (axes,) = style.panels(1, 2.4)
-    single = len(materials) == 1 and len(channels) == 1
-    panel = curves.arrange([material.name for material in materials], [""], channels)[0]
+    single = len(materials) == len(channels) == 1
+    panel = curves.arrange([material.name for material in materials], ["all"], channels)[0]
     for line in panel.lines:
-        material = materials[line.material]
-        look = line.look | {"label": ("all" if line.channel is None else line.look["label"]) if single else line.look["label"]}
-        if single:
-            look["color"] = "black"
+        material, look = materials[line.material], line.look | ({"color": "black"} if single else {})
         curves.draw(axes, over_incidence(material, phi, wavelengths), line._replace(look=look))
         if single if parts is None else parts:
-            colours = style.MATERIALS if single else [line.look["color"]] * 9
-            named = f"{line.look['label']}, " if not single else ""
             for n, (name, curve) in enumerate(parts_of(material, phi, wavelengths).items()):
-                look = {"label": named + name, "color": colours[n % len(colours)], "linestyle": style.DASHES[1 + n % 3]}
-                curves.draw(axes, curve, Line(line.material, 0, line.channel, look))
+                colour = style.MATERIALS[n % len(style.MATERIALS)] if single else look["color"]
+                label = name if single else f"{look['label']}, {name}"
+                part = {"label": label, "color": colour, "linestyle": style.DASHES[1 + n % 3]}
+                curves.draw(axes, curve, line._replace(look=part))
     top = max(np.max(line.get_ydata(), initial=0) for line in axes.lines)
     axes.set(xlim=(-1.5, 90), xticks=range(0, 91, 15), ylim=(0, max(1.05 * top, 1e-3)))
     axes.set(xlabel=rf"{style.THETA_I} [°]", ylabel="directional albedo")

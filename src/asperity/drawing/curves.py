@@ -15,6 +15,9 @@ from matplotlib.figure import Figure
 from . import style
 from .values import Curve, one
 
+FEW = 20
+"""Measured points that are drawn larger."""
+
 
 class Line(NamedTuple):
     """Indices of a material, a case and a channel (None: their mean), and how that is drawn."""
@@ -72,7 +75,7 @@ def draw(axes: Axes, curve: Curve, line: Line) -> None:
         **look,
         linestyle="none",
         marker=style.MARKERS[line.material % len(style.MARKERS)],
-        markersize=2,
+        markersize=2 if len(curve.x) > FEW else 3.5,
         markeredgewidth=0,
         elinewidth=0.6,
         capsize=1.2,

@@ -24,7 +24,7 @@ RINGS = (30, 60)
 """Degrees from the normal that are marked."""
 
 
-def hemisphere(
+def figure(
     materials: Sequence[Any],
     *,
     theta: Sequence[float] | None = None,
@@ -42,24 +42,33 @@ def hemisphere(
     found = [values.one(over_disc(material, incident, cosine, wavelengths), index) for material in materials]
     norm = style.norm(found, scale)
     made, grid = grid_of(len(materials), len(incident))
-    for material, maps, row in zip(materials, found, grid):
+    for maps, row in zip(found, grid):
         for k, axes in enumerate(row):
             image = disc(axes, maps[k], norm, incident[k])
             if isolines:
                 lines(axes, maps[k], norm)
-            if row is grid[0]:
-                axes.set_title(rf"{style.THETA_I} = {incident[k, 0]:g}°")
-        row[0].text(-0.06, 0.5, material.name, transform=row[0].transAxes, rotation=90, ha="right", va="center")
+    angles = [rf"{style.THETA_I} = {angle:g}°" for angle, _ in incident]
+    label(grid, [material.name for material in materials], angles)
     bar(made, image, grid, style.quantity(cosine))
     name_marks(grid[0, 0])
     return made
+
+
+def label(grid: np.ndarray, rows: Sequence[str], columns: Sequence[str]) -> None:
+    """Names of materials, and of what is shown of them, beside and above discs (rows, columns)."""
+    for axes, column in zip(grid[0], columns):
+        axes.set_title(column if len(rows) > 1 or len(columns) > 1 else f"{rows[0]}, {column}")
+    if len(rows) == 1 and len(columns) > 1:
+        grid[0, 0].figure.suptitle(rows[0], fontsize=8)
+    for axes, row in zip(grid[:, 0], rows if len(rows) > 1 else ()):
+        axes.text(-0.06, 0.5, row, transform=axes.transAxes, rotation=90, ha="right", va="center")
 
 
 def grid_of(rows: int, columns: int) -> tuple[Figure, np.ndarray]:
     """A figure with discs (rows, columns)."""
     width = style.COLUMN if columns == 1 else style.PAGE
     side = min(2.3, (width - 0.9) / columns)
-    made = style.figure(side * columns + 0.9, side * rows + 0.2)
+    made = style.figure(side * columns + 0.9, side * rows + 0.3)
     return made, made.subplots(rows, columns, squeeze=False)
 
 
@@ -70,7 +79,7 @@ def bar(made: Figure, image: Any, grid: np.ndarray, label: str, **options: Any) 
 
 def name_marks(axes: Axes) -> None:
     """Say in the corner below a disc what is marked on it."""
-    place = {"loc": "lower left", "bbox_to_anchor": (-0.07, -0.04)}
+    place = {"loc": "lower left", "bbox_to_anchor": (0.0, -0.04)}
     named = axes.legend(**place, fontsize=5.5, handletextpad=-0.2, borderpad=0, labelspacing=0.2)
     named.set_in_layout(False)
 
@@ -79,7 +88,7 @@ def pixels() -> np.ndarray:
     """The directions of a map's pixels (SIZE, SIZE, 3), rows from below; z < 0 outside the disc."""
     x, y = np.meshgrid(*[(np.arange(SIZE) + 0.5) / SIZE * 2 - 1] * 2)
     z = 1 - x**2 - y**2  # the area within is 1 - cos θ
-    stretch = np.sqrt((1 + np.clip(z, 0, 1)))
+    stretch = np.sqrt(1 + np.clip(z, 0, 1))
     return np.stack([x * stretch, y * stretch, z], axis=-1)
 
 
@@ -115,9 +124,7 @@ def cells(wo: np.ndarray, rows: int, columns: int) -> np.ndarray:
     return row * columns + np.minimum((turn * columns).astype(int), columns - 1)
 
 
-def disc(
-    axes: Axes, map: np.ndarray, norm: Normalize, incident: np.ndarray, colours: str = style.MAP
-) -> Any:
+def disc(axes: Axes, map: np.ndarray, norm: Normalize, incident: np.ndarray, colours: str = style.MAP) -> Any:
     """Draw a map (SIZE, SIZE) with what helps to read it; returns the image."""
     map = style.visible(map, norm)
     image = axes.imshow(map, origin="lower", extent=(-1, 1, -1, 1), norm=norm, cmap=colours, interpolation="bilinear")

@@ -21,7 +21,7 @@ VIEW = (22, 110)
 """From where one looks, elevation and azimuth relative to the light's, which comes from the left."""
 
 
-def lobe3d(
+def figure(
     materials: Sequence[Any],
     *,
     theta: Sequence[float] | None = None,
@@ -49,8 +49,9 @@ def lobe3d(
 def mesh(theta: float, phi: float) -> np.ndarray:
     """Directions (rings, sectors, 3) over the hemisphere, closed in azimuth, closer about the mirrored one."""
     fine = np.arange(-NEAR, NEAR + FINE / 2, FINE)
-    rings = np.unique(np.clip(np.concatenate([np.arange(0, 90, STEP), [values.HORIZON], theta + fine]), 0, values.HORIZON))
-    turn = np.unique(np.concatenate([np.arange(-180, 181, STEP), fine]))
+    rings = np.concatenate([np.arange(0, 90, STEP), [values.HORIZON], theta + fine])
+    rings = np.unique(np.clip(rings, 90 - values.HORIZON, values.HORIZON))  # without the pole, which has no normal
+    turn = np.unique(np.concatenate([np.arange(-180, 181, STEP), fine]))[::-1]  # so that normals point outwards
     t, p = np.meshgrid(rings, turn + phi + 180, indexing="ij")
     return directions(np.stack([t.ravel(), p.ravel()], axis=1)).reshape(*t.shape, 3)
 
@@ -68,13 +69,15 @@ def surface(axes: Any, wo: np.ndarray, f: np.ndarray, scale: str, incident: tupl
         axes.text(1.2 * x, 1.2 * y, 0, f"{azimuth}°", fontsize=6, color="0.35", ha="center", va="center")
     colours = mpl.colormaps[style.MAP](r)
     x, y, z = np.moveaxis(wo * r[..., None], -1, 0)
-    looks = {"facecolors": colours, "lightsource": LightSource(-phi - VIEW[1] + 60, 50), "rasterized": True}
+    looks = {"facecolors": colours, "lightsource": LightSource(90 - phi - VIEW[1] + 30, 50), "rasterized": True}
     axes.plot_surface(x, y, z, rstride=1, cstride=1, linewidth=0, antialiased=False, **looks).set_zorder(2)
     w = directions([incident])[0]
     axes.quiver(*(1.15 * w), *(-w), length=0.35, color=style.LIGHT, linewidth=1, arrow_length_ratio=0.3, zorder=3)
     axes.plot([0, 0], [0, 0], [0, 1.05], color="0.3", linewidth=0.6, linestyle=":", zorder=1)
     axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(0, 1.05))
-    axes.set_box_aspect((2, 2, 1.05), zoom=1.5)
+    axes.set_box_aspect((2, 2, 1.05), zoom=1.3)
     axes.view_init(VIEW[0], phi + VIEW[1])
     axes.set_axis_off()
-    axes.text2D(0.98, 0.04, f"length 1 = {radius.top:.3g}/sr", transform=axes.transAxes, fontsize=6, ha="right")
+    axes.text2D(
+        0.98, 0.04, f"radius of the circle: {radius.top:.3g}/sr", transform=axes.transAxes, fontsize=6, ha="right"
+    )

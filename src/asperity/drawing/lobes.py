@@ -17,7 +17,7 @@ RAYS = (-90, -60, -30, 0, 30, 60, 90)
 """Degrees from the normal that are marked."""
 
 
-def lobes(
+def figure(
     materials: Sequence[Any],
     *,
     theta: Sequence[float] | None = None,
@@ -79,9 +79,10 @@ def draw(axes: Axes, curve: Curve, radius: Radius, line: curves.Line) -> None:
         return
     colour, error = line.look["color"], values.one(curve.error, line.channel)
     ends = radius(np.stack([value - error, value + error]))
-    axes.plot(ends * sin, ends * cos, color=colour, linewidth=0.6)
+    axes.plot(ends * sin, ends * cos, color=colour, linewidth=0.6, zorder=3)
     marker = style.MARKERS[line.material % len(style.MARKERS)]
-    axes.plot(r * sin, r * cos, marker, color=colour, label=line.look["label"], markersize=2, markeredgewidth=0)
+    look = {"label": line.look["label"], "markersize": 2, "markeredgewidth": 0, "zorder": 3}
+    axes.plot(r * sin, r * cos, marker, color=colour, **look)
 
 
 def grid(axes: Axes, radius: Radius, below: bool) -> None:

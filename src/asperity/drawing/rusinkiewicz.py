@@ -21,7 +21,7 @@ HORIZON = 1e-2
 """Of cosines; below, there is nothing to see."""
 
 
-def rusinkiewicz(
+def figure(
     materials: Sequence[Any],
     *,
     phi: float = 0.0,

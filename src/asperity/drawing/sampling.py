@@ -14,7 +14,7 @@ from asperity.goniophotometer.sensors import check_angles
 from asperity.lab.checks import density
 
 from . import style, values
-from .hemisphere import SIZE, bar, cells, disc, name_marks, pixels
+from .hemisphere import SIZE, bar, cells, disc, label, name_marks, pixels
 
 LIMIT = 4
 """Standard deviations at the ends of the scale."""
@@ -22,7 +22,7 @@ CELL = 4 * np.pi / (density.ROWS * density.COLUMNS)
 """Solid angle in steradians."""
 
 
-def sampling(
+def figure(
     materials: Sequence[Any], *, theta: Sequence[float] | None = None, phi: float = 0.0, scale: str = "log"
 ) -> Figure:
     """Histogram of `sample` beside `pdf`, and their difference in standard deviations, a row a material."""
@@ -37,12 +37,12 @@ def sampling(
     made = style.figure(style.PAGE, 2.1 * len(materials) + 0.3)
     grid = made.subplots(len(materials), 3, squeeze=False)
     incident = np.array([angles[0], phi])
-    for material, maps, row in zip(materials, found, grid):
-        image = [disc(axes, one, norm, incident) for axes, one in zip(row, maps[:2])][0]
+    for maps, row in zip(found, grid):
+        disc(row[0], maps[0], norm, incident)
+        image = disc(row[1], maps[1], norm, incident)
         deviation = disc(row[2], maps[2], Normalize(-LIMIT, LIMIT), incident, style.DIFFERENCES)
-        row[0].text(-0.06, 0.5, material.name, transform=row[0].transAxes, rotation=90, ha="right", va="center")
-    for axes, title in zip(grid[0], ("sample", "pdf", "difference")):
-        axes.set_title(title)
+    names = [f"{material.name}, {style.THETA_I} = {angles[0]:g}°" for material in materials]
+    label(grid, names, ("sample", "pdf", "difference"))
     name_marks(grid[0, 0])
     bar(made, image, grid[:, :2], "density [1/sr]")
     bar(made, deviation, grid[:, 2:], "standard deviations", extend="both")

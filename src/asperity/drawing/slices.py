@@ -15,7 +15,7 @@ STEEP = 20
 """A peak so many times the median of its curve is drawn with logarithms, if nothing is said."""
 
 
-def slices(
+def figure(
     materials: Sequence[Any],
     *,
     theta: Sequence[float] | None = None,
@@ -45,7 +45,8 @@ def slices(
 
 def suited(found: Sequence[np.ndarray]) -> str:
     """The scale on which values (channels, n) are seen."""
-    return "log" if any(0 < STEEP * np.median(value[value > 0]) < value.max() for value in found) else "linear"
+    lit = [value[value > 0] for value in found if (value > 0).any()]
+    return "log" if any(STEEP * np.median(value) < value.max() for value in lit) else "linear"
 
 
 def finish(axes: Axes, scale: str, cosine: bool) -> None:

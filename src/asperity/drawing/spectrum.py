@@ -20,7 +20,7 @@ STEP = 5.0
 """nm."""
 
 
-def spectrum(
+def figure(
     materials: Sequence[Any],
     *,
     theta: Sequence[float] | None = None,
@@ -57,4 +57,3 @@ def spectrum(
     for n, panel in enumerate(panels):
         panels[n] = panel._replace(title=rf"{panel.title}, {style.THETA_I} = {incident:g}°")
     return curves.finish(made, places, panels)
-

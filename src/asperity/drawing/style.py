@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm, Normalize
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 
 from asperity.errors import UnknownNameError
 from asperity.files import atomically
@@ -103,7 +103,7 @@ def sequence(count: int) -> list[Any]:
     return list(mpl.colormaps[MAP](np.linspace(0.05, 0.8, max(count, 2))[:count]))
 
 
-def legend(made: Figure, axes: Sequence[Axes]) -> None:
+def legend(made: FigureBase, axes: Sequence[Axes]) -> None:
     """Name the lines of all diagrams once, below them; nothing if there is but one."""
     named: dict[str, Any] = {}
     for one in axes:
@@ -111,7 +111,7 @@ def legend(made: Figure, axes: Sequence[Axes]) -> None:
             named.setdefault(label, handle)
     if len(named) > 1:
         widest = max(len(re.sub(r"\$.*?\$", "x", name)) for name in named)
-        columns = max(1, int(made.get_figwidth() * 14 / (widest + 5)))
+        columns = max(1, int(made.bbox.width / made.dpi * 14 / (widest + 5)))
         made.legend(named.values(), named.keys(), loc="outside lower center", ncols=min(columns, len(named)))
 
 

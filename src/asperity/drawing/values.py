@@ -65,7 +65,9 @@ def _check_variant(wavelengths: Sequence[float] | None) -> None:
     if not dr.is_jit_v(mi.Float):
         raise ParameterError(f"variant {variant}: pictures need one that computes on arrays, such as llvm_ad_rgb.")
     if wavelengths is not None and not mi.is_spectral:
-        raise ParameterError(f"wavelengths: variant {variant} has none. Choose a spectral one, such as llvm_ad_spectral.")
+        raise ParameterError(
+            f"wavelengths: variant {variant} has none. Choose a spectral one, such as llvm_ad_spectral."
+        )
     for wavelength in wavelengths or ():
         if not mi.MI_CIE_MIN <= wavelength <= mi.MI_CIE_MAX:
             raise ParameterError(f"wavelength = {wavelength:g}: expected nm in [{mi.MI_CIE_MIN:g}, {mi.MI_CIE_MAX:g}].")
@@ -100,7 +102,7 @@ def one(values: np.ndarray, index: int | None) -> np.ndarray:
     return values.mean(axis=0) if index is None else values[index]
 
 
-def at(material: Any, wi: np.ndarray, wo: np.ndarray, wavelengths: Sequence[float] | None = None) -> np.ndarray:
+def at(material: Any, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = None) -> np.ndarray:
     """f |cos θo| in 1/sr (channels, ...) for directions (..., 3), which are broadcast; raises ParameterError for NaN.
 
     In spectral variants at ``wavelengths``, any number of them, all in the same call.
@@ -245,12 +247,13 @@ def _cells_in_plane(material: Any, phi: float, k: int) -> tuple[np.ndarray, np.n
         back, forth = sectors(sensor, phi), sectors(sensor, phi + 180)
         weights = np.repeat([back[1], forth[1]], sensor.rows, axis=0)
         return np.concatenate([back[0], forth[0]]), weights, np.concatenate([-centres, centres])
+    cells: np.ndarray
     centre = sensor.directions(material.measured.wi[k])[:, 0]
     toward = np.array([np.cos(np.radians(phi)), np.sin(np.radians(phi))])
     if isinstance(sensor, Window):
         cells = np.arange(sensor.n)[:, None] * sensor.n + [(sensor.n - 1) // 2, sensor.n // 2]
         centre = centre[cells].mean(axis=1)
-        chosen = centre[:, 2] > 0
+        chosen = np.asarray(centre[:, 2] > 0)
     else:
         assert isinstance(sensor, Points)
         cells = np.arange(sensor.cells)[:, None]

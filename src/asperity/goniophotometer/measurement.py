@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ..errors import ParameterError, UnreadableFileError, readable
 from ..files import atomically
 from . import sensors
 from .tracer import BELOW, CUT, ELSEWHERE, EXTRA, UNIT
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FORMATS = (".npz",)
 ARRAYS = {"incident": "f", "labels": "iu", "paths": "iu", "energy": "u", "goal": "iu"}
@@ -217,6 +220,12 @@ class Measurement:
                 albedo_errors=self.albedo.error,
                 orders=np.arange(1, self.orders + 1),
             )
+
+    def plot(self, model: dict[str, Any] | None = None) -> Figure:
+        """A figure of it, for `savefig`; ``model``, a description, draws a model's values as well."""
+        from . import plots
+
+        return plots.figure(self, model)
 
     @staticmethod
     def load(path: str | Path) -> Measurement:

@@ -14,8 +14,9 @@ import mitsuba as mi
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import LogLocator
 
 from ..errors import ParameterError
 from ..lab import evaluate
@@ -25,18 +26,25 @@ from .tracer import UNIT
 
 QUANTITY = r"$f\,\cos\theta_o$ [1/sr]"
 ERROR = "relative standard error [%]"
+OFF = "model / measured - 1 [%]"
 DECADES = 3
 """Below the largest value: what is less is not told apart."""
 STEEP = 10
 """A slice whose peak is so many times its median is drawn with logarithms."""
 STEPS = 8
 """Directions along each side of a cell at which the model is evaluated."""
+COARSE = 3
+"""The same, where there are many directions of incidence."""
 SMOOTH = 256
 """Corners of the polygon that stands for a circle, at least."""
 LEGIBLE = 8
 """Points whose values have a place below the axis, at most."""
 SAMPLES = 2**12
 """Of a model, for each of its albedos."""
+ROWS = 12
+"""Directions of incidence that get a row each; more are shown together, small."""
+SMALL = 48
+"""Pixels along each side of a disc among many."""
 COLOURS = {"R": "#c1272d", "G": "#2e8b57", "B": "#2858a8"}
 BY_ORDER = ("#1f4e79", "#c8641e", "#3a7d44", "#7b3f8c", "#8c6d1f", "#555555")
 MARKERS = "osD^vP"
@@ -58,17 +66,21 @@ ALL = Line(None, None, "sum", "black", "o")
 def figure(measured: Measurement, model: dict[str, Any] | None = None) -> Figure:
     """A figure: a row for each direction of incidence, and below them the albedos, if there are several.
 
+    More than `ROWS` directions are shown together, as small maps.
+
     ``model`` is the description of a BSDF to draw as well; it needs a variant with the measurement's channels.
     """
     if model is not None:
-        _check_channels(measured)
+        check_channels(measured)
         measured = replace(measured, about=measured.about | {"model": model})  # lines are named by it
+    bsdf = None if model is None else mi.load_dict(model, parallel=False)
+    if len(measured.incident) > ROWS:
+        return overview(measured, bsdf)
     several = len(np.unique(measured.incident[:, 0])) > 1
     heights = [3.4] * len(measured.incident) + [3.0] * several
     figure = Figure(figsize=(13, sum(heights) + 0.2), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-    bsdf = None if model is None else mi.load_dict(model, parallel=False)
     for k, row in enumerate(rows[: len(measured.incident)]):
         theta, phi = measured.incident[k]
         value, error = (numbers[k].mean() for numbers in measured.total_albedo)
@@ -78,6 +90,79 @@ def figure(measured: Measurement, model: dict[str, Any] | None = None) -> Figure
     if several:
         plot_albedo(measured, bsdf, rows[-1])
     return figure
+
+
+def overview(measured: Measurement, bsdf: Any) -> Figure:
+    """A figure of many directions of incidence: a small map of each, beside its error, or how far the model is off."""
+    sensor, (value, error) = measured.sensor, (numbers.mean(axis=-1) for numbers in measured.summed)
+    if bsdf is None:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            beside, name, norm, colours = 100 * error / value, ERROR, LogNorm(0.1, 100), "magma"
+    else:
+        found = [model_means(measured, k, bsdf, *each(sensor), COARSE) for k in range(len(value))]
+        means = np.stack(found).mean(axis=-1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            beside, name, norm, colours = 100 * (means / value - 1), OFF, Normalize(-50, 50), "RdBu_r"
+    figure = Figure(figsize=(13, 11), dpi=150, layout="constrained")
+    FigureCanvasAgg(figure)
+    top, bottom = figure.subfigures(2, 1, height_ratios=(8, 3))
+    value = np.where(value > 0, value, np.nan)
+    left = (value, QUANTITY, LogNorm(*brightness_range(measured)), "viridis")
+    for axes, (values, label, scale, map) in zip(top.subplots(1, 2), (left, (beside, name, norm, colours))):
+        mosaic(axes, measured, [small(sensor, one, measured.wi[k]) for k, one in enumerate(values)], scale, map, label)
+    plot_albedo(measured, bsdf, bottom)
+    return figure
+
+
+def mosaic(axes: Axes, measured: Measurement, pictures: list[np.ndarray], norm: Any, colours: str, label: str) -> None:
+    """Draw equal pictures in rows of θ and columns of φ, if they fill such a table; or else in a square, in order."""
+    (theta, phi), count = (np.unique(angles) for angles in measured.incident.T), len(pictures)
+    tabular = len(theta) * len(phi) == count
+    columns = len(phi) if tabular else int(np.ceil(np.sqrt(count)))
+    order = np.lexsort(measured.incident.T[::-1]) if tabular else np.arange(count)
+    height, width = np.array(pictures[0].shape) + 2
+    canvas = np.full((height * -(-count // columns), width * columns), np.nan)
+    for place, k in enumerate(order):
+        row, column = divmod(place, columns)
+        y, x = row * height, column * width
+        canvas[y : y + height - 2, x : x + width - 2] = pictures[k]
+        if not tabular:
+            name = f"{measured.incident[k, 0]:.3g}°, {measured.incident[k, 1]:.3g}°"
+            axes.text(x, y, name, fontsize=4, va="bottom")
+    image = axes.imshow(canvas, norm=norm, cmap=colours, interpolation="nearest")
+    axes.spines[:].set_visible(False)
+    axes.set(xticks=[], yticks=[])
+    if tabular:
+        axes.set_xticks((np.arange(len(phi)) + 0.5) * width - 1, [f"{angle:.3g}°" for angle in phi], fontsize=7)
+        axes.set_yticks((np.arange(len(theta)) + 0.5) * height - 1, [f"{angle:.3g}°" for angle in theta], fontsize=7)
+        axes.set(xlabel=r"$\phi_i$", ylabel=r"$\theta_i$")
+    ticks = {"ticks": LogLocator(10, (1, 2, 5)), "format": "%.3g"} if isinstance(norm, LogNorm) else {}
+    bar = axes.figure.colorbar(image, ax=axes, label=label, location="top", shrink=0.9, extend="both", **ticks)
+    bar.ax.minorticks_off()
+
+
+@singledispatch
+def small(sensor: Sensor, values: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    """A small picture, rows from above, of values (cells,) that a sensor has measured."""
+    return values[None]
+
+
+@small.register
+def small_hemisphere(sensor: Hemisphere, values: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    """A disc in the equal-area projection, seen from above."""
+    x, y = np.meshgrid((np.arange(SMALL) + 0.5) / SMALL * 2 - 1, 1 - (np.arange(SMALL) + 0.5) / SMALL * 2)
+    square = x**2 + y**2  # 1 - cos θ
+    row = np.minimum((square * sensor.rows).astype(int), sensor.rows - 1)
+    turn = np.arctan2(y, x) / (2 * np.pi) % 1
+    column = np.minimum((turn * sensor.columns).astype(int), sensor.columns - 1)
+    return np.where(square < 1, values[row * sensor.columns + column], np.nan)
+
+
+@small.register
+def small_window(sensor: Window, values: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    """A square, away from the normal to the right."""
+    above = sensor.directions(wi)[:, 0, 2] > 0
+    return np.where(above, values, np.nan).reshape(sensor.n, sensor.n).T[::-1]
 
 
 @singledispatch
@@ -150,6 +235,9 @@ def plot_albedo(measured: Measurement, bsdf: Any, figure: SubFigure) -> None:
     axes = figure.subplots()
     theta, phi = measured.incident.T
     azimuths, grid = np.unique(phi), np.linspace(0, 89.5, 90)
+    if len(azimuths) > LEGIBLE:
+        axes.set_title(f"{LEGIBLE} of {len(azimuths)} azimuths", fontsize=9)
+        azimuths = azimuths[np.linspace(0, len(azimuths) - 1, LEGIBLE).round().astype(int)]
     for n, azimuth in enumerate(azimuths):
         chosen = np.flatnonzero(phi == azimuth)
         at = rf", $\phi_i$ = {azimuth:g}°" if len(azimuths) > 1 else ""
@@ -281,14 +369,16 @@ def model_lines(measured: Measurement, values: np.ndarray) -> list[tuple[np.ndar
     ]
 
 
-def model_means(measured: Measurement, k: int, bsdf: Any, cells: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def model_means(
+    measured: Measurement, k: int, bsdf: Any, cells: np.ndarray, weights: np.ndarray, steps: int = STEPS
+) -> np.ndarray:
     """What `curve` would give if the surface were the model's: (bins, channels)."""
-    wo = measured.sensor.directions(measured.wi[k], STEPS)[cells]  # (bins, n, steps², 3)
+    wo = measured.sensor.directions(measured.wi[k], steps)[cells]  # (bins, n, steps², 3)
     means = evaluate.cell_means(bsdf, measured.wi[k], wo, measured.wavelengths)
     return (means * weights).sum(axis=-1).T
 
 
-def _check_channels(measured: Measurement) -> None:
+def check_channels(measured: Measurement) -> None:
     """Raise ParameterError if a model has other channels, in the variant in use, than what was measured."""
     names = measured.channels
     spectral, count = measured.wavelengths is not None, dr.size_v(mi.UnpolarizedSpectrum)

@@ -17,14 +17,19 @@ MOST_POINTS = 20_000  # more only cover each other
 
 def write(result: Result, path: str | Path) -> None:
     """Write a PNG of what ``result`` measured."""
+    figure(result).savefig(Path(path), format="png")
+
+
+def figure(result: Result) -> Figure:
+    """Draw what ``result`` measured."""
     if result.evidence is None:
         raise ParameterError(f"check {result.name!r} measured nothing that can be drawn")
-    figure = Figure(figsize=(12, 4.5), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
+    drawn = Figure(figsize=(12, 4.5), dpi=120, layout="constrained")
+    FigureCanvasAgg(drawn)
     verdict = {True: "passed", False: "failed", None: "skipped"}[result.passed]
-    figure.suptitle(f"{result.name} {verdict}: {result.measured}", fontsize=10, wrap=True)
-    plot(result.evidence, figure)
-    figure.savefig(Path(path), format="png")
+    drawn.suptitle(f"{result.name} {verdict}: {result.measured}", fontsize=10, wrap=True)
+    plot(result.evidence, drawn)
+    return drawn
 
 
 @singledispatch

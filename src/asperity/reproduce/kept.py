@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import mitsuba as mi
 
-from .. import __version__
 from ..errors import ParameterError, UnreadableFileError
 from ..files import atomically
 from ..validation.report import Effort, Finding, Section, Table
+from ..version import __version__
 
 PACKAGE = Path(__file__).parents[1]
 WORDS = PACKAGE / "cli", PACKAGE / "reproduce" / "papers"

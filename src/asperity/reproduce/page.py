@@ -77,7 +77,7 @@ def part(result: Result, kept: Kept | None, command: str, folder: str) -> list[s
     if kept is None:
         return [*lines, "**Here:** not made yet."]
     found = findings(result, kept)
-    lines += [f"**Here:** {kept.section.text}".rstrip(), *listed(found)]
+    lines += [f"**Here:** {kept.section.text}", *listed(found)]
     lines += [table.markdown() for table in tables(result, kept)]
     lines += [f"![{result.label}: {result.shows}]({folder}/{name}.png)" for name in pictures(result, kept)]
     lines += [f"**Where it differs, and why:** {result.why}", f"**Command:** `{command} --only '{result.label}'`"]
@@ -104,7 +104,7 @@ def tally(found: Sequence[Finding]) -> str:
     """How many hold."""
     judged = [finding.passed for finding in found if finding.passed is not None]
     if not judged:
-        return "reported, not judged" if found else "a picture"
+        return "shown, not judged"
     return f"{sum(judged)} of {len(judged)} hold" if all(judged) else f"**{judged.count(False)} of {len(judged)} fail**"
 
 

@@ -89,6 +89,13 @@ def from_file(path: str | Path, crease: float | None = None) -> ShadedMesh:
     return mesh._replace(vertices=(mesh.vertices - foot) * (FITTED_SIZE / (high - low).max()))
 
 
+def turned(mesh: ShadedMesh, degrees: float) -> ShadedMesh:
+    """The mesh, turned counterclockwise about the z axis."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return mesh._replace(vertices=mesh.vertices @ turn, normals=mesh.normals @ turn)
+
+
 class Content(NamedTuple):
     """What a file holds: as a `ShadedMesh`, but None for what it lacks; faces without area are left out."""
 

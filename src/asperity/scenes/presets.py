@@ -13,6 +13,8 @@ from asperity.errors import UnknownNameError, UnreadableFileError, readable, sug
 FOLDER = Path(__file__).with_name("presets")
 FORMATS = (".json",)
 DEFAULT = "dusty-wood"
+VIEW = ("object", "env", "light", "floor")
+"""What ``preview`` may hold."""
 
 
 class Preset(NamedTuple):
@@ -72,7 +74,7 @@ def _preset(path: Path, content: Any) -> Preset:
         raise ValueError('it has no BSDF: expected {"type": ...}, or {"material": {"type": ...}}')
     _complete(material, "material", path.parent)
     view = _object("preview", content.get("preview", {}))
-    _known(view, ("object", "env"))
+    _known(view, VIEW)
     for key, value in view.items():
         if not isinstance(value, str):
             raise ValueError(f"preview.{key} is {_short(value)}, not a name or the path of a file")

@@ -172,7 +172,12 @@ def distant_masking(effort: Effort) -> Section:
             (line,) = axes.plot([a for a, _ in angles], model[:, row], label=name)
             axes.plot([a for a, _ in angles], truth.value[:, row], "o", color=line.get_color(), markersize=4)
     axes.legend(fontsize=7)
-    return Section("The distant term (Fig. 6)", "", findings, figures={"fig6": figure})
+    return Section(
+        "The distant term (Fig. 6)",
+        f"G₁dist of the exposed points that face i, by their heights in {rows} steps, at {len(angles)} angles.",
+        findings,
+        figures={"fig6": figure},
+    )
 
 
 def pores(effort: Effort) -> Section:

@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
-from .. import __version__
 from ..files import atomically
 from ..goniophotometer import Estimate
+from ..version import __version__
 
 SIGNIFICANCE, CLAIMS = 0.01, 64
 """Probability that a right model fails a report which judges that many claims, over all numbers compared (Šidák)."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -18,14 +19,12 @@ import numpy as np
 from ... import llvm, loading
 from .first import First, first_picture
 from .scenes import scenes
-from .turns import finish, quartiles, turns
+from .timing import finish, quartiles, turns
 
 Description = dict[str, Any]
 Row = dict[str, Any]
 CALLS = "eval_pdf", "sample"
 FRAMES = "bare", "preview", "filled", "point"
-LIGHTS = {"filled": "environment map", "point": "point light"}
-"""The frames whose noise tells most, and why."""
 
 
 class Effort(NamedTuple):
@@ -56,13 +55,13 @@ def measure(
     reference = next(iter(materials))
     rows: dict[str, Row] = {name: {"against": reference} for name in materials}
     for column, tasks in calls(materials, effort.lanes).items():
-        seconds, _ = turns(tasks, effort.rounds, lambda column=column: tick(column))
+        seconds, _ = turns(tasks, effort.rounds, partial(tick, column))
         for name, times in seconds.items():
             rows[name][column] = timed(1e9 / effort.lanes * times, 1e9 / effort.lanes * seconds[reference])
     for column, scene in scenes(effort.size, effort.spp).items():
         tasks = {name: frame(scene(material)) for name, material in materials.items()}
         # One more frame than times, for the noise is that of two.
-        seconds, images = turns(tasks, effort.rounds + 1, lambda column=column: tick(column))
+        seconds, images = turns(tasks, effort.rounds + 1, partial(tick, column))
         spp = effort.spp * (4 if column == "bare" else 1)
         noise = {name: spp * relative_variance(pictures) for name, pictures in images.items()}
         for name, times in seconds.items():
@@ -77,14 +76,14 @@ def measure(
         for name, material in materials.items():
             firsts[name].append(first_picture(material, str(mi.variant())))
             tick("first")
-    for name in materials if effort.fresh else ():
+    for name in materials:
         (wall, _, memory), (wall_of, _, memory_of) = (np.array(firsts[one]).T for one in (name, reference))
         rows[name]["first"] = timed(wall, wall_of)
         rows[name]["memory"] = {"value": quartiles(memory), "ratio": quartiles(memory / np.maximum(memory_of, 1e-9))}
     return rows
 
 
-def tasks(materials: Mapping[str, Description], effort: Effort) -> int:
+def steps(materials: Mapping[str, Description], effort: Effort) -> int:
     """How often ``tick`` is called."""
     each = len(CALLS) * (effort.rounds + 1) + len(FRAMES) * (effort.rounds + 2) + effort.fresh
     return each * len(materials)
@@ -99,15 +98,15 @@ def calls(materials: Mapping[str, Description], lanes: int) -> dict[str, dict[st
     si = dr.zeros(mi.SurfaceInteraction3f, lanes)
     si.wi = wi
 
-    def evaluates(bsdf: Any) -> Callable[[], None]:
-        return lambda: finish(bsdf.eval_pdf(ctx, si, wo)) and None
-
-    def samples(bsdf: Any) -> Callable[[], None]:
-        return lambda: finish(bsdf.sample(ctx, si, u, v)) and None
-
     bsdfs = {name: loading.load(material) for name, material in materials.items()}
-    found = {name: evaluates(bsdf) for name, bsdf in bsdfs.items()}
-    return {"eval_pdf": found, "sample": {name: samples(bsdf) for name, bsdf in bsdfs.items()}}
+
+    def eval_pdf(bsdf: Any) -> None:
+        finish(bsdf.eval_pdf(ctx, si, wo))
+
+    def sample(bsdf: Any) -> None:
+        finish(bsdf.sample(ctx, si, u, v))
+
+    return {call.__name__: {name: partial(call, bsdf) for name, bsdf in bsdfs.items()} for call in (eval_pdf, sample)}
 
 
 def frame(description: Description) -> Callable[[], Any]:

@@ -8,13 +8,17 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import drjit as dr
+import mitsuba as mi
+
+from ...scenes.preview import preview
+
 SIZE, SPP = 64, 4
 """Of the picture: nearly all of the time is tracing and compiling."""
-MEBIBYTE = 2**20 if sys.platform == "darwin" else 2**10
-"""In units of the system's ``ru_maxrss``."""
 
 
 class First(NamedTuple):
@@ -30,7 +34,7 @@ def first_picture(material: dict[str, Any], variant: str) -> First:
     with tempfile.TemporaryDirectory() as home:
         paths = [str(Path(__file__).parents[3]), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
         done = subprocess.run(
-            [sys.executable, "-m", __name__, variant],
+            [sys.executable, "-c", f"from {__package__} import first; first.main({variant!r})"],
             env=os.environ | {"HOME": home, "LOCALAPPDATA": home, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
             input=json.dumps(material),
             capture_output=True,
@@ -44,12 +48,6 @@ def first_picture(material: dict[str, Any], variant: str) -> First:
 
 def here(material: dict[str, Any], variant: str) -> First:
     """In this process, which must be a new one."""
-    import asperity  # noqa: F401  isort: skip  (before Mitsuba)
-    import drjit as dr
-    import mitsuba as mi
-
-    from asperity.scenes.preview import preview
-
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     wall, cpu = time.perf_counter(), time.process_time()
@@ -61,12 +59,16 @@ def here(material: dict[str, Any], variant: str) -> First:
 
 def most_memory() -> float:
     """The most that this process had, in MiB; 0 on Windows, which does not tell."""
-    try:
+    with suppress(OSError, StopIteration), open("/proc/self/status") as file:
+        # Not ru_maxrss, which on Linux counts what the parent had when it started this process.
+        return next(int(line.split()[1]) for line in file if line.startswith("VmHWM")) / 2**10
+    with suppress(ImportError):
         import resource
-    except ImportError:
-        return 0.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEBIBYTE
+
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20  # in bytes on macOS
+    return 0.0
 
 
-if __name__ == "__main__":
-    print(json.dumps(here(json.load(sys.stdin), sys.argv[1])._asdict()))
+def main(variant: str) -> None:
+    """What the new process does: from a description to numbers, as JSON."""
+    print(json.dumps(here(json.load(sys.stdin), variant)._asdict()))

@@ -24,7 +24,7 @@ PAPER = Paper(
             "The analytic BRDF of symmetric grooves matches a Monte Carlo simulation closely, bounce by bounce: GGX, "
             "α .3, .5, .7 and 1, at 0 to 80°.",
             "bounces",
-            "It does not, with twenty times the paths of the paper and more. Within 6° of the mirror direction f has "
+            "It does not, with a hundred times the paths of the paper. Within 6° of the mirror direction f has "
             "a pole that few paths find, so cells there are not judged. The densities of the paper's sampling (its "
             "Section 6) are replaced.",
         ),

@@ -1,0 +1,361 @@
+"""The functions that `import asperity` offers: any material, with NumPy arrays in and out.
+
+**Materials** are what `materials.resolve` takes: a preset's name, a model's or a Mitsuba plugin's, a file or text in
+JSON or XML, a dictionary, a loaded ``mi.BSDF``, a measurement.
+
+**Directions** are what `arrays.Directions` takes: arrays whose last axis holds unit vectors (3), or the angles θ and φ
+in degrees (2). ``wi`` points to where light comes from, or the camera, ``wo`` to the other; both away from the surface.
+
+**Variants.** The active variant of Mitsuba is used. If none is set, ``llvm_ad_rgb`` is. A scalar variant is replaced by
+its LLVM one, and one without wavelengths, if they are asked for, by a spectral one; both for the time of the call,
+which then costs half a second more. A BSDF that is loaded already has to be of the variant that is used.
+
+**Channels**, the last axis of values: R, G and B; one in mono variants; or the ``wavelengths``, in nm, asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from . import drawing, goniophotometer, loading, models, plugin, validation
+from .arrays import CHUNK, Array, Directions, mapped
+from .errors import ParameterError, refuse_unused
+from .goniophotometer.mesh import MESHES
+from .lab import checks
+from .lab import evaluate as lab
+from .materials import Material, resolve
+from .parameters import Declared
+from .results import Checks, Picture, Samples
+from .scenes import presets as _presets
+
+NM = (360.0, 830.0)
+"""Wavelengths that Mitsuba knows."""
+SOBOL = 2**14
+"""Samples of an albedo: of smooth BSDFs it has four digits then."""
+
+material = resolve
+
+
+def evaluate(
+    material: Any,
+    wi: ArrayLike,
+    wo: ArrayLike,
+    *,
+    wavelengths: Sequence[float] | None = None,
+    out: Any = None,
+    chunk: int = CHUNK,
+) -> Array:
+    """f(wi, wo) |cos θo|, in 1/sr: (..., channels), for directions that are broadcast against each other.
+
+    The cosine belongs to it, as in ``mi.BSDF.eval``. Mirrors and smooth glass have no such values: 0.
+
+    ``chunk`` pairs are computed at a time. With ``out``, an array of the result's shape, such as a ``np.memmap``, and
+    directions in one, memory is bounded however many there are. Raises ParameterError, and what `material` raises.
+    """
+    with _loaded(material, wavelengths) as target:
+
+        def values(i: Array, o: Array) -> Array:
+            return target.channels(lambda si: target.bsdf.eval(mi.BSDFContext(), si, lab.vectors(o)), i)
+
+        return mapped(values, target.directions(wi=wi, wo=wo), target.width, out, chunk)
+
+
+def pdf(material: Any, wi: ArrayLike, wo: ArrayLike, *, out: Any = None, chunk: int = CHUNK) -> Array:
+    """The density, in 1/sr, with which the material samples ``wo`` given ``wi``: (...,); ``out`` as in `evaluate`.
+
+    In spectral variants it is that of wavelengths from 450 to 650 nm.
+    """
+    with _loaded(material, colourless=True) as target:
+
+        def values(i: Array, o: Array) -> Array:
+            si = lab.interaction(lab.vectors(i), len(i), target.groups[0])
+            return lab.to_numpy(target.bsdf.pdf(mi.BSDFContext(), si, lab.vectors(o)), len(i)).T
+
+        directions = target.directions(wi=wi, wo=wo)
+        return mapped(values, directions, 1, None if out is None else out[..., None], chunk)[..., 0]
+
+
+def albedo(
+    material: Any,
+    theta: ArrayLike,
+    phi: ArrayLike = 0.0,
+    *,
+    wavelengths: Sequence[float] | None = None,
+    samples: int = SOBOL,
+) -> Array:
+    """The share of the light from θ and φ, in degrees, that is reflected upwards: (..., channels), for any shape.
+
+    It is the mean weight of ``samples`` points of Sobol's sequence, a power of two: the same in every call.
+    """
+    if not (isinstance(samples, int) and samples > 0 and samples & (samples - 1) == 0):
+        raise ParameterError(f"samples = {samples!r}: expected a power of two, such as {SOBOL}.")
+    with _loaded(material, wavelengths) as target:
+        angles = target.directions(theta=_angles(theta, phi))
+
+        def values(i: Array) -> Array:
+            found = [lab.albedo(target.bsdf, i, samples, group) for group in target.groups]
+            return np.concatenate(found)[: target.width].T
+
+        return mapped(values, angles, target.width, chunk=max(1, CHUNK // samples))
+
+
+def sample(
+    material: Any,
+    wi: ArrayLike,
+    n: int,
+    *,
+    seed: int = 0,
+    wavelengths: Sequence[float] | None = None,
+    chunk: int = CHUNK,
+) -> Samples:
+    """Draw ``n`` directions for each of ``wi``: arrays (..., n), and an axis more for components and channels.
+
+    The same ``seed`` gives the same directions, whatever the chunk. All channels share a direction, so there are at
+    most as many ``wavelengths`` as a spectral variant has channels.
+    """
+    if not (isinstance(n, int) and n > 0):
+        raise ParameterError(f"n = {n!r}: expected a whole number above 0.")
+    random = np.random.default_rng(seed)
+    with _loaded(material, wavelengths) as target:
+        if len(target.groups) > 1:
+            most = dr.size_v(mi.UnpolarizedSpectrum)
+            raise ParameterError(f"wavelengths: {target.width} of them, and a sample has at most {most}.")
+
+        def values(i: Array) -> Array:
+            u = random.random((len(i), 3), dtype=np.float32).T
+            si = lab.interaction(lab.vectors(i), len(i), target.groups[0])
+            bs, weight = target.bsdf.sample(mi.BSDFContext(), si, mi.Float(u[0]), mi.Point2f(u[1:]))
+            parts = (bs.wo, bs.pdf, mi.unpolarized_spectrum(weight))
+            return np.concatenate([lab.to_numpy(part, len(i)) for part in parts])[: 4 + target.width].T
+
+        [given] = target.directions(wi=wi)
+        found = mapped(values, [given.repeated(n)], 4 + target.width, chunk=chunk)
+        return Samples(found[..., :3], found[..., 4:], found[..., 3])
+
+
+def check(
+    material: Any,
+    only: Sequence[str] = checks.NAMES,
+    *,
+    progress: Callable[[str, int, int], None] = checks.quiet,
+) -> Checks:
+    """Check what every BSDF must obey: sampling, reciprocity, energy, gradients and more; see `lab.checks`."""
+    _ensure_variant()
+    found = resolve(material)
+    bsdf = found.load()
+    return Checks(found.name, tuple(checks.check(found.description or bsdf, progress, only)))
+
+
+def measure(
+    what: Any,
+    theta: ArrayLike = (0.0, 30.0, 60.0),
+    phi: ArrayLike = 0.0,
+    *,
+    bsdf: dict[str, Any] | None = None,
+    spacing: tuple[float, float] | float | None = None,
+    periodic: str | None = None,
+    **options: Any,
+) -> goniophotometer.Measurement:
+    """Measure a BSDF by tracing light, from θ and φ in degrees, through a microgeometry.
+
+    ``what`` is a material whose model has a microgeometry; a mesh, .ply or .obj; heights, an array (rows, columns); or
+    any `goniophotometer.Microgeometry`. A mesh and heights take the ``bsdf`` of their facets, and whether they go on
+    ``periodic``: `goniophotometer.Mesh` says how; heights need the ``spacing`` of their samples. ``options`` are those
+    of `goniophotometer.measure`: paths, orders, apart, sensor, tiles, seed, ...
+    """
+    _ensure_variant()
+    surface = {"bsdf": bsdf, "spacing": spacing, "periodic": periodic}
+    given: dict[str, Any] = {name: value for name, value in surface.items() if value is not None}
+    about: dict[str, Any] = {}
+    if isinstance(what, (str, Path)) and Path(what).suffix.lower() in MESHES:
+        geometry: Any = goniophotometer.from_file("mesh", what, **given)
+    elif isinstance(what, np.ndarray):
+        if spacing is None:
+            raise ParameterError("spacing: heights need the distance between them.")
+        geometry = goniophotometer.HeightField(what, **given)
+    else:
+        refuse_unused(surface, (), "what is neither a mesh nor heights")
+        geometry = what
+        if not hasattr(what, "piece"):
+            found = resolve(what)
+            found.load()
+            geometry = models.microgeometry(found.description or {"type": found.name})
+            about = {"model": found.description}
+    incident = [(float(t), float(p)) for t, p in _angles(theta, phi).reshape(-1, 2)]
+    return goniophotometer.measure(geometry, incident, **{"about": about} | options)
+
+
+def validate(model: str, folder: str | Path, *, quick: bool = False, **options: Any) -> validation.Report:
+    """Compare a model with light traced through its microgeometry; write ``report.md`` into ``folder``.
+
+    It takes minutes, ``quick`` a tenth of them; ``options`` are those of `validation.validate`.
+    """
+    _ensure_variant()
+    return validation.validate(model, folder, quick=quick, **options)
+
+
+def render(
+    material: Any,
+    *,
+    size: int | tuple[int, int] = 512,
+    spp: int = 64,
+    seed: int = 0,
+    **view: Any,
+) -> Picture:
+    """Render the preview scene: ``size`` is (width, height), or both; ``view`` what `scenes.preview.preview` takes.
+
+    ``object`` and ``env``, say. A preset has its own, which are the default.
+    """
+    from .scenes.preview import preview
+
+    _ensure_variant()
+    width, height = size if isinstance(size, tuple) else (size, size)
+    for name, value in {"width": width, "height": height, "spp": spp}.items():
+        if not (isinstance(value, int) and 0 < value <= 2**15):
+            raise ParameterError(f"{name} = {value!r}: expected a whole number in [1, {2**15}].")
+    found = resolve(material)
+    bsdf = found.load()
+    scene = loading.load(preview(found.description or bsdf, size=(width, height), **found.preview | view))
+    return Picture(np.array(mi.render(scene, spp=spp, seed=seed), dtype=np.float32))
+
+
+def plot(*materials: Any, view: str = "lobes", **options: Any) -> Figure:
+    """A figure of one or several materials, for its ``savefig``; ``view`` and ``options`` are those of `drawing.plot`.
+
+    In spectral variants, or where the option ``wavelengths`` asks for one, at these wavelengths.
+    """
+    active = _ensure_variant()
+    with _variant(_arrays(active, options.get("wavelengths") is not None)):
+        return drawing.plot([resolve(material) for material in materials], view, **options)
+
+
+def presets() -> dict[str, Material]:
+    """All presets by name, each a `Material`: its ``description`` is a dictionary for ``mi.load_dict``."""
+    return {name: resolve(name) for name in _presets.names()}
+
+
+def register(model: type, name: str | None = None) -> type:
+    """Make a model of one's own, derived from `lobes.LobeModel`, a plugin; returns it, so that it can decorate.
+
+    It is called ``name``, or as its class in small letters. In every variant, at once and from now on. A model that was
+    registered under the name is replaced, but none of asperity's or Mitsuba's.
+    """
+    if not (isinstance(model, type) and issubclass(model, Declared)):
+        raise ParameterError(f"model = {model!r}: expected a class derived from asperity.lobes.LobeModel.")
+    name = name or model.__name__.lower()
+    taken = name in models.MODELS and not getattr(models.MODELS[name], "registered", False)
+    if taken or mi.PluginManager.instance().plugin_type(name) != mi.ObjectType.Unknown:
+        raise ParameterError(f"name = {name!r}: there is such a plugin already. Take another.")
+    model.registered = True  # type: ignore[attr-defined]
+    models.MODELS[name] = model
+    if mi.variant() is not None:
+        plugin.register()
+    return model
+
+
+class _Loaded(NamedTuple):
+    """A BSDF of the active variant, with what is needed to ask it."""
+
+    name: str
+    bsdf: Any
+    groups: list[tuple[float, ...] | None]
+    """Wavelengths, as many at a time as the variant has channels; one group, None, if it has none."""
+    width: int
+    """Channels that are asked for."""
+    measured: tuple[float, float]
+    """Range of θi, in degrees, where there are values."""
+
+    def directions(self, **given: Any) -> list[Directions]:
+        """Directions by the name of their parameter, which have to be where this BSDF has values."""
+        flags = self.bsdf.flags()
+        through = mi.has_flag(flags, mi.BSDFFlags.Transmission) or mi.has_flag(flags, mi.BSDFFlags.BackSide)
+        high, reason = (180.0, "") if through else (90.0, f": {self.name} has no values below its surface")
+        return [
+            Directions(name, array, high=high, reason=reason)
+            if name == "wo" or self.measured == (0.0, 90.0)
+            else Directions(name, array, *self.measured, f": there {self.name} was measured")
+            for name, array in given.items()
+        ]
+
+    def channels(self, function: Callable[[Any], Any], wi: Array) -> Array:
+        """What ``function`` of the surface interaction gives, (n, channels), at all wavelengths."""
+        points = (lab.interaction(lab.vectors(wi), len(wi), group) for group in self.groups)
+        found = [lab.to_numpy(mi.unpolarized_spectrum(function(si)), len(wi)) for si in points]
+        return np.concatenate(found)[: self.width].T
+
+
+@contextmanager
+def _loaded(material: Any, wavelengths: Sequence[float] | None = None, colourless: bool = False) -> Iterator[_Loaded]:
+    """The material, loaded in a variant that computes arrays, and wavelengths if they are asked for.
+
+    In a spectral variant these have to be, unless what is asked for is ``colourless``.
+    """
+    found, active = resolve(material), _ensure_variant()
+    with _variant(_arrays(active, wavelengths is not None)):
+        channels = dr.size_v(mi.UnpolarizedSpectrum)
+        chosen = _wavelengths(wavelengths, channels if colourless else 0)
+        groups: list[Any] = [_filled(chosen[k : k + channels], channels) for k in range(0, len(chosen), channels)]
+        theta = (0.0, 90.0) if found.measured is None else tuple(found.measured.incident[[0, -1], 0])
+        yield _Loaded(found.name, found.load(), groups or [None], len(chosen) or channels, theta)
+
+
+def _arrays(variant: str, wavelengths: bool) -> str:
+    """The variant like this one that computes arrays, and wavelengths, if they are asked for."""
+    found = variant.replace("scalar_", "llvm_ad_")
+    return f"{found.partition('_')[0]}_ad_spectral" if wavelengths and "spectral" not in found else found
+
+
+@contextmanager
+def _variant(wanted: str) -> Iterator[None]:
+    """That variant, for a while."""
+    active = mi.variant()
+    try:
+        if wanted != active:
+            mi.set_variant(wanted)
+        yield
+    finally:
+        if wanted != active:
+            mi.set_variant(active)
+
+
+def _ensure_variant() -> str:
+    """The active variant; ``llvm_ad_rgb``, from now on, if there is none."""
+    if mi.variant() is None:
+        mi.set_variant("llvm_ad_rgb")
+    return str(mi.variant())
+
+
+def _wavelengths(given: Sequence[float] | None, default: int) -> tuple[float, ...]:
+    """Wavelengths in nm, none in a variant without; if none are given, ``default`` many, unless that is 0."""
+    if not mi.is_spectral:
+        return ()
+    if given is None and default:
+        return tuple(np.linspace(450, 650, default))
+    if given is None:
+        raise ParameterError(f"wavelengths: variant {mi.variant()} needs them, in nm; [450, 550, 650], say.")
+    array = np.asarray(given, dtype=np.float64)
+    if array.ndim != 1 or not array.size or not np.all((array >= NM[0]) & (array <= NM[1])):
+        raise ParameterError(f"wavelengths = {loading.short(given)}: expected a list of numbers in {list(NM)} nm.")
+    return tuple(array.tolist())
+
+
+def _filled(group: tuple[float, ...], count: int) -> tuple[float, ...]:
+    """As many as ``count``, by repeating the last."""
+    return group + group[-1:] * (count - len(group))
+
+
+def _angles(theta: ArrayLike, phi: ArrayLike) -> Array:
+    """θ and φ, in degrees, as directions (..., 2)."""
+    try:
+        return np.stack(np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (theta, phi))), axis=-1)
+    except (TypeError, ValueError):
+        raise ParameterError("theta and phi: expected numbers, or arrays that go together.") from None
