@@ -20,6 +20,7 @@ import pages  # noqa: E402
 
 SMALL = {
     "render": ["--size", "16", "--spp", "1"],
+    "compare": ["--no-preview"],
     "check": ["--only", "finiteness"],
     "measure": ["--paths", "1e4", "--tiles", "2"],
 }
