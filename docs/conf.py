@@ -45,7 +45,8 @@ html_show_sourcelink = False
 html_copy_source = False
 
 
-FUNCTION = "<mi>(?:sin|cos|ln|atan2)</mi>"
+NAME = "<mi>(?:sin|cos|ln|exp|asinh|atan2)</mi>"
+FUNCTION = rf"(?:<msup>{NAME}<mn>2</mn></msup>|(?<!<msup>){NAME})"
 SPACE = '<mspace width="0.17em"/>'
 
 
@@ -53,7 +54,7 @@ def mathml(node: Any, display: str) -> str:
     """A formula, with spaces around functions, and bars that do not stretch, which the converter leaves out."""
     text = converter.convert(node.astext(), display=display)
     text = re.sub(f"({FUNCTION})(?=<m(?:i|n|sub|sup|frac)>)", rf"\1{SPACE}", text)
-    text = re.sub(f"(?<=</mi>|</mn>)(?=(?:<msup>)?{FUNCTION})", SPACE, text)
+    text = re.sub(f"(?<=</mi>|</mn>)(?={FUNCTION})", SPACE, text)
     return re.sub(
         r"<mo[^>]*>(?:&#x0007C;|&#x02223;|\|)</mo>", '<mo stretchy="false" lspace="0" rspace="0">|</mo>', text
     )
