@@ -35,6 +35,7 @@ exclude_patterns = ["_build"]
 myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_inline"]
 myst_heading_anchors = 3
 highlight_language = "text"
+smartquotes = False  # options begin with two hyphens
 bibtex_bibfiles = [f"{pages.FOLDER}/models.bib"]
 
 html_theme = "furo"
