@@ -6,6 +6,8 @@ A material is one of:
 - a file: a description in JSON, or Mitsuba's XML; a measurement, ``.npz`` of ours or ``.bsdf`` of RGL's;
 - a text, the JSON or XML itself;
 - in Python, also a dictionary, a `Measurement`, or a loaded ``mi.BSDF``.
+
+Commands import this before they run, so that it imports nothing heavy itself.
 """
 
 from __future__ import annotations
@@ -19,7 +21,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import loading, xml
 from .errors import ParameterError, UnknownNameError, UnreadableFileError, readable, suggestion
 from .scenes import presets
 
@@ -57,6 +58,7 @@ class Material:
         """
         import mitsuba as mi
 
+        from . import loading
         from .lab.evaluate import active_variant
 
         active_variant()
@@ -134,6 +136,8 @@ def _from_name(name: str) -> Material:
 
 
 def _from_file(path: Path) -> Material:
+    from . import loading, xml
+
     if path.is_dir():
         raise UnreadableFileError("material", path, FORMATS, "it is a folder")
     readable("material", path, FORMATS)
@@ -157,6 +161,8 @@ def _from_file(path: Path) -> Material:
 
 def _from_text(text: str) -> Material:
     """JSON or XML; files that it names are looked for in the current folder."""
+    from . import loading, xml
+
     try:
         if text.startswith("<"):
             description, preview = xml.bsdf(text), {}
@@ -175,6 +181,7 @@ def _is_plugin(name: str) -> bool:
     """
     import mitsuba as mi
 
+    from . import loading
     from .models import MODELS
 
     if name in MODELS or mi.PluginManager.instance().plugin_type(name) != mi.ObjectType.Unknown:
@@ -201,6 +208,7 @@ def _names() -> list[str]:
 
 def _interpolated(measured: Measurement) -> Any:
     """The measurement as a BSDF of the active variant."""
+    from . import loading
     from .goniophotometer import tensor_file
 
     with tempfile.TemporaryDirectory(prefix="asperity-") as folder:
@@ -211,6 +219,8 @@ def _interpolated(measured: Measurement) -> Any:
 
 def changed(description: Description, settings: Iterable[str] | Mapping[str, Any]) -> Description:
     """A description with other parameters. Whether they exist is for the plugin to say; raises ParameterError."""
+    from . import loading
+
     changes = settings.items() if isinstance(settings, Mapping) else map(_setting, settings)
     result = _copied(description)
     for path, new in changes:
