@@ -1,7 +1,7 @@
 """Writes what in the documentation comes from the code: `python docs/build.py [--pictures]`.
 
 The parameter tables, and those of speed from `speed.json`, always (a test holds them to the declarations and to that
-file); the pictures on request: they take three minutes.
+file); the pictures on request: they take ten minutes.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def run(line):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["start", "checks", "plotting"])
+@pytest.mark.parametrize("name", ["start", "checks", "plotting", "goniophotometer"])
 def test_a_page_can_be_followed(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}

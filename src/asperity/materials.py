@@ -32,6 +32,8 @@ Description = dict[str, Any]
 TENSORS = {".bsdf": "measured", ".pbsdf": "measured_polarized"}
 """Mitsuba's plugins for measurements, by the endings of their files."""
 FORMATS = (".json", ".xml", ".npz", *TENSORS)
+ABOVE = (0.0, 90.0)
+"""θ, in degrees, of all directions above a surface."""
 TRIED = (
     f"Tried: presets, models, Mitsuba's BSDFs, and files ({', '.join(FORMATS)}). `asperity list` shows presets and "
     "models."
@@ -50,6 +52,21 @@ class Material:
     bsdf: Any = None
     preview: dict[str, Any] = field(default_factory=dict)
     measured: Measurement | None = None
+
+    @property
+    def incidence(self) -> tuple[float, float]:
+        """The range of θi, in degrees, that was measured; beyond it Mitsuba would repeat the last values."""
+        import numpy as np
+
+        from . import loading
+
+        if self.measured is not None:
+            theta = self.measured.incident[:, 0]
+        elif self.description is not None and self.description.get("type") in TENSORS.values():
+            theta = np.degrees(loading.tensors(Path(self.description["filename"]))["theta_i"])
+        else:
+            return ABOVE
+        return float(theta.min()), float(theta.max())
 
     def load(self) -> Any:
         """The ``mi.BSDF`` of the active variant; raises ParameterError if there is none.
@@ -83,6 +100,7 @@ def resolve(what: Any, settings: Iterable[str] | Mapping[str, Any] = ()) -> Mate
     No variant needs to be set. Raises UnknownNameError, UnreadableFileError or ParameterError.
     """
     found = _found(what)
+    settings = [settings] if isinstance(settings, str) else settings
     if not settings:
         return found
     if found.description is None:
@@ -138,7 +156,7 @@ def _from_name(name: str) -> Material:
 def _from_file(path: Path) -> Material:
     from . import loading, xml
 
-    if path.is_dir():
+    if os.path.isdir(path):
         raise UnreadableFileError("material", path, FORMATS, "it is a folder")
     readable("material", path, FORMATS)
     ending = path.suffix.lower()

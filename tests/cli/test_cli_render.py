@@ -174,3 +174,9 @@ def test_ctrl_c_keeps_the_picture(asperity, tmp_path, monkeypatch):
     assert "stopped early: out.png and out.exr: 16 samples per pixel" in result.output
     assert files(tmp_path) == ["out.exr", "out.png"]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("material", ["diffuse", '{"type": "diffuse", "reflectance": 0.9}'])
+def test_a_material_by_its_name_or_text(asperity, tmp_path, material):
+    result = asperity("render", material, "--set", "reflectance=0.2", *TINY, "-o", "out.png")
+    assert result.exit_code == 0 and (tmp_path / "out.png").is_file(), result.output
