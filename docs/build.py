@@ -279,13 +279,14 @@ def plots(folder: Path, page: Path = DOCS / "plotting.md") -> None:
 
 
 def shrink(source: Path, target: Path) -> None:
-    """Write a picture in 256 colours, half as wide, or narrower, until it is no larger than `LARGEST`."""
+    """Write a picture half as wide, or narrower, until it is no larger than `LARGEST`; a PNG in 256 colours."""
     from PIL import Image
 
     image = Image.open(source).convert("RGB")
     for factor in (2, 2.4, 2.8, 3.2, 3.6):
         size = round(image.width / factor), round(image.height / factor)
-        image.resize(size, Image.Resampling.LANCZOS).quantize(256).save(target, optimize=True)
+        small = image.resize(size, Image.Resampling.LANCZOS)
+        (small.quantize(256) if target.suffix == ".png" else small).save(target, optimize=True, quality=70)
         if target.stat().st_size <= LARGEST:
             return
 

@@ -1,6 +1,9 @@
 """All views: each draws any material, and says what it cannot draw."""
 
 from known import GOLD, GRAINS, GROOVES, lambertian, measurement  # isort: skip
+import re
+from pathlib import Path
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -122,3 +125,13 @@ def test_what_was_not_measured_is_not_drawn(rgb, measured):
     mi.set_variant("llvm_ad_spectral")
     with pytest.raises(ParameterError, match=r"variant llvm_ad_spectral.*other channels there than measured.*R, G, B"):
         drawing.plot([measured, lambertian()], "slices")
+
+
+def test_the_page_shows_every_view():
+    """A section each, with a picture that is there, and small."""
+    docs = Path(__file__).parents[2] / "docs"
+    page = (docs / "plotting.md").read_text()
+    assert set(drawing.VIEWS) <= set(re.findall("^## (.*)$", page, re.MULTILINE))
+    pictures = re.findall(r"\]\((pictures/.*?)\)", page)
+    assert len(pictures) == len(drawing.VIEWS) + 1
+    assert all((docs / picture).stat().st_size <= 60_000 for picture in pictures)

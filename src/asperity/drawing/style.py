@@ -20,7 +20,6 @@ from asperity.files import atomically
 
 COLUMN, PAGE = 3.35, 7.0
 """Inches: one column of a paper (8.5 cm), and both."""
-FORMATS = (".png", ".pdf", ".svg")
 SCALES = ("linear", "log")
 DECADES = 4
 """Below the largest value: what is less is not told apart on logarithmic scales."""
