@@ -1,14 +1,18 @@
 """Writes what in the documentation comes from the code: `python docs/build.py [--pictures]`.
 
 The parameter tables, and those of speed from `speed.json`, always (a test holds them to the declarations and to that
-file); the pictures on request: they take three minutes.
+file); the pictures on request: they take ten minutes.
 """
 
 from __future__ import annotations
 
 import json
+import re
+import shlex
+import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from textwrap import fill
 
 DOCS = Path(__file__).parent
@@ -42,6 +46,8 @@ INDICES = (1.0, 1.2, 1.33, 1.5)
 WHITE = {"type": "rgb", "value": 1.0}
 PAINT = {"type": "interfacedlambertian", "diffuse_reflectance": WHITE}
 GRAINS = {"type": "micrograin", "tau_0": 0.5, "base": {"type": "diffuse", "reflectance": WHITE}}
+LARGEST = 60_000
+"""Bytes of a picture on the page of plots."""
 KEPT = (
     ("`roughconductor`", {"type": "roughconductor", "distribution": "ggx", "material": "none"}, "alpha"),
     ("`vgroove`", {"type": "vgroove", "material": "none"}, "alpha"),
@@ -77,7 +83,8 @@ SWEEPS: dict[str, tuple[tuple[dict, str, tuple[float, ...]], ...]] = {
     ),
 }
 """What a parameter does: a material, the parameter, and its values."""
-STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", "dirty-weave")
+STRIP = ("dusty-wood", "verdigris", "gilded", "moldy-glass", "red-flock")
+STRIP += ("worn-copper", "polished-gold", "hematite", "corrugated-plastic", "lacquer-by-normal")
 
 
 def table(model) -> str:
@@ -160,21 +167,40 @@ def kept_table() -> str:
     return "\n".join(lines)
 
 
-def strip(path: Path, size: int = 256, spp: int = 256) -> None:
-    """Six presets side by side."""
+def shot(name: str, size: int, spp: int):
+    """A preset's preview, denoised, at twice the size and then halved: `PIL.Image`."""
     import mitsuba as mi
     import numpy as np
+    from PIL import Image
 
-    from asperity.scenes import presets
+    from asperity.scenes import denoise, presets
     from asperity.scenes.preview import preview
 
     mi.set_variant("llvm_ad_rgb")
-    images = []
-    for name in STRIP:
-        preset = presets.load(name)
-        scene = preview(preset.material, **preset.preview, size=(size, size), spp=spp)
-        images.append(np.asarray(mi.render(mi.load_dict(scene, parallel=False))))
-    mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)[..., :3]), write_async=False)
+    preset = presets.load(name)
+    scene = mi.load_dict(preview(preset.material, **preset.preview, size=(2 * size, 2 * size)), parallel=False)
+    image = denoise.denoised(np.array(mi.render(scene, spp=spp)), *denoise.features(scene))
+    bitmap = mi.Bitmap(image).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, srgb_gamma=True)
+    return Image.fromarray(np.array(bitmap)).resize((size, size), Image.Resampling.BOX)
+
+
+def strip(path: Path, size: int = 240, columns: int = 5, spp: int = 64) -> None:
+    """The presets of STRIP in rows."""
+    from PIL import Image
+
+    whole = Image.new("RGB", (columns * size, -(-len(STRIP) // columns) * size))
+    for n, name in enumerate(STRIP):
+        whole.paste(shot(name, size, spp), (n % columns * size, n // columns * size))
+    whole.save(path, optimize=True)
+
+
+def gallery(folder: Path, size: int = 256, spp: int = 16) -> None:
+    """A thumbnail of each preset, for the site."""
+    from asperity.scenes import presets
+
+    folder.mkdir(exist_ok=True)
+    for name in presets.names():
+        shot(name, size, spp).save(folder / f"{name}.jpg", quality=88)
 
 
 def sweeps(name: str) -> str:
@@ -260,6 +286,30 @@ def figures(folder: Path) -> None:
     save(lambertsphere.ball(report.Effort(4e6, 32)).figures["ball"], folder / "ball.png")
 
 
+def plots(folder: Path, page: Path = DOCS / "plotting.md") -> None:
+    """The pictures below the commands of a page: those that these write, made smaller."""
+    shown = re.compile(r"^```sh\n(.*?)^```\n(?:\n!\[.*?\]\(pictures/(.*?)\))?", re.MULTILINE | re.DOTALL)
+    with TemporaryDirectory() as place:
+        for commands, picture in shown.findall(page.read_text()):
+            for command in commands.splitlines():
+                line = [sys.executable, "-m", *shlex.split(command), *(["--force"] if picture else [])]
+                written = subprocess.run(line, cwd=place, check=True, stdout=subprocess.PIPE, text=True).stdout
+            if picture:
+                shrink(Path(place, written.split()[-1]), folder / picture)
+
+
+def shrink(source: Path, target: Path) -> None:
+    """Write a picture in 256 colours, half as wide, or narrower, until it is no larger than `LARGEST`."""
+    from PIL import Image
+
+    image = Image.open(source).convert("RGB")
+    for factor in (2, 2.4, 2.8, 3.2, 3.6):
+        size = round(image.width / factor), round(image.height / factor)
+        image.resize(size, Image.Resampling.LANCZOS).quantize(256).save(target, optimize=True)
+        if target.stat().st_size <= LARGEST:
+            return
+
+
 def main() -> None:
     """Write the tables, and the pictures if asked."""
     import asperity  # noqa: F401  (before Mitsuba)
@@ -273,7 +323,9 @@ def main() -> None:
     page.write_text(between(page.read_text(), BEGIN_KEPT, kept_table(), END_KEPT))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
+        gallery(DOCS / "pictures" / "gallery")
         figures(DOCS / "pictures")
+        plots(DOCS / "pictures")
         draw_sweeps(DOCS / "pictures" / "sweeps")
         patches(DOCS / "pictures" / "macbeth.png")
 

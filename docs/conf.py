@@ -25,7 +25,8 @@ import asperity
 pages.write(DOCS / pages.FOLDER)  # before the extensions look for the bibliography
 
 project = "asperity"
-author = "the authors of asperity"
+author = "the asperity authors"
+copyright = "the asperity authors, BSD-3-Clause"
 version = release = asperity.__version__
 
 extensions = ["myst_parser", "sphinxcontrib.bibtex", "sphinx_copybutton"]
@@ -34,6 +35,7 @@ exclude_patterns = ["_build"]
 myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_inline"]
 myst_heading_anchors = 3
 highlight_language = "text"
+smartquotes = False  # options begin with two hyphens
 bibtex_bibfiles = [f"{pages.FOLDER}/models.bib"]
 
 html_theme = "furo"
@@ -44,7 +46,8 @@ html_show_sourcelink = False
 html_copy_source = False
 
 
-FUNCTION = "<mi>(?:sin|cos|ln|atan2)</mi>"
+NAME = "<mi>(?:sin|cos|ln|exp|asinh|atan2)</mi>"
+FUNCTION = rf"(?:<msup>{NAME}<mn>2</mn></msup>|(?<!<msup>){NAME})"
 SPACE = '<mspace width="0.17em"/>'
 
 
@@ -52,7 +55,7 @@ def mathml(node: Any, display: str) -> str:
     """A formula, with spaces around functions, and bars that do not stretch, which the converter leaves out."""
     text = converter.convert(node.astext(), display=display)
     text = re.sub(f"({FUNCTION})(?=<m(?:i|n|sub|sup|frac)>)", rf"\1{SPACE}", text)
-    text = re.sub(f"(?<=</mi>|</mn>)(?=(?:<msup>)?{FUNCTION})", SPACE, text)
+    text = re.sub(f"(?<=</mi>|</mn>)(?={FUNCTION})", SPACE, text)
     return re.sub(
         r"<mo[^>]*>(?:&#x0007C;|&#x02223;|\|)</mo>", '<mo stretchy="false" lspace="0" rspace="0">|</mo>', text
     )

@@ -70,11 +70,13 @@ def entry(preset: Any) -> str:
     from asperity.scenes import presets
 
     material = json.loads((presets.FOLDER / f"{preset.name}.json").read_text())["material"]
+    shown = picture(preset)
     return "\n".join(
         [
             f"(preset-{preset.name})=",
             f"### {preset.title}",
             "",
+            f":::{{container}} preset\n{shown}\n:::\n" if shown else "",
             f"{preset.about} *{preset.source}.*",
             "",
             f"```sh\nasperity render --preset {preset.name}\n```",
@@ -109,8 +111,13 @@ def commands() -> str:
 
 def word(argument: Any) -> str:
     """An argument as it stands in a line of usage."""
-    name = (argument.metavar or argument.name.upper()) + ("..." if argument.nargs != 1 else "")
-    return name if argument.required else f"[{name}]"
+    name = called(argument) if argument.required else f"[{called(argument)}]"
+    return name if argument.nargs == 1 else f"{name}..."
+
+
+def called(argument: Any) -> str:
+    """An argument's name, without the brackets and dots that some have in it."""
+    return (argument.metavar or argument.name.upper()).strip("[].")
 
 
 def table(parameters: list[Any]) -> str:
@@ -122,7 +129,7 @@ def table(parameters: list[Any]) -> str:
 def row(parameter: Any) -> str:
     """One of them."""
     if parameter.param_type_name == "argument":
-        name = f"`{parameter.metavar or parameter.name.upper()}`"
+        name = f"`{called(parameter)}`"
     else:
         value = "" if parameter.is_flag else f" {parameter.metavar or parameter.name.strip('_').upper()}"
         name = ", ".join(f"`{option}{value}`" for option in [*parameter.opts, *parameter.secondary_opts])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity import models, validation
-from asperity.goniophotometer import Hemisphere
+from asperity import validation
+from asperity.goniophotometer import Hemisphere, tensor_file
 from asperity.lab import evaluate
 from asperity.lobes import ByCosine, LobeModel, diffuse
 from asperity.parameters import Colour
@@ -87,7 +87,7 @@ def test_other_variants(variant, channels):
 
 def test_samples(rgb):
     """Cosine-distributed: of 2^14 samples, the mean of the cosine, 2/3, has a standard error of 0.0018."""
-    drawn = asp.sample(GREY, [(0, 0), (70, 10)], 2**14, seed=4)
+    drawn = asp.sample(GREY, [(0, 0), (70, 10)], np.int64(2**14), seed=4)
     assert drawn.wo.shape == (2, 2**14, 3) and drawn.pdf.shape == (2, 2**14)
     assert drawn.weight == pytest.approx(np.full((2, 2**14, 3), 0.25), rel=1e-6)
     assert drawn.pdf == pytest.approx(drawn.wo[..., 2] / np.pi, rel=1e-5)
@@ -109,12 +109,15 @@ def measured():
     return asp.measure(np.zeros((2, 2)), [10, 40, 80], bsdf=GREY, spacing=1.0, sensor=Hemisphere(8, 16), paths=2**16)
 
 
-def test_a_measurement_has_values_where_it_was_measured(rgb, measured):
+def test_a_measurement_has_values_where_it_was_measured(rgb, measured, tmp_path):
     """65536 paths over 128 cells: 1000 a cell at 40 degrees, of which a quarter comes back; a standard error of 3%."""
     assert measured.total_albedo.value == pytest.approx(np.full((3, 3), 0.25), rel=1e-6)
     assert asp.evaluate(measured, (40, 0), (30, 90)) == pytest.approx([0.25 * 0.75**0.5 / np.pi] * 3, rel=0.15)
     with pytest.raises(asp.ParameterError, match=r"wi\[0\] = \(85, 0\): expected θ within \[10, 80\] degrees"):
         asp.evaluate(measured, (85, 0), (30, 90))
+    tensor_file.write(measured, tmp_path / "flat.bsdf")
+    with pytest.raises(asp.ParameterError, match=r"expected θ within \[10, 80\] degrees: there flat was measured"):
+        asp.evaluate(tmp_path / "flat.bsdf", (85, 0), (30, 90))
     with pytest.raises(asp.ParameterError, match="require the use of a RGB variant"):
         asp.evaluate(measured, (40, 0), (30, 90), wavelengths=[500])
 
@@ -128,11 +131,14 @@ def test_what_is_measured(rgb, tmp_path):
     model = asp.measure("vgroove", 0, **effort)
     assert model.about["model"]["type"] == "vgroove"
     assert mesh.plot().axes and model.plot().axes
+    mi.set_variant("scalar_rgb")
+    assert asp.measure(tmp_path / "flat.obj", 30, **effort, wavelengths=[450, 500, 550, 600]).mode == "spectral"
+    assert mi.variant() == "scalar_rgb"
 
 
 def test_checks(rgb, tmp_path):
     white = asp.material(GREY, {"reflectance": {"type": "uniform", "value": 2.0}})
-    wrong, right = (asp.check(material, ["energy", "determinism"]) for material in (white, GREY))
+    wrong, right = (asp.check(material, ("energy", "determinism")) for material in (white, GREY))
     assert right.passed and not right.plot() and not right.save(tmp_path)
     assert [result.name for result in wrong.failed] == ["energy"] and len(list(wrong)) == 2
     assert "energy        FAILED   albedo 2.0000" in str(wrong) and len(wrong.plot()) == 1
@@ -164,6 +170,24 @@ def test_plots(rgb, materials, tmp_path):
     assert len(figure.axes[0].lines) >= len(materials)
 
 
+def test_a_spectrum_needs_no_spectral_variant(rgb):
+    assert asp.plot(SLOPE, view="spectrum", theta=[30]).axes and mi.variant() == "llvm_ad_rgb"
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_rgb"])
+def test_a_comparison(variant, tmp_path):
+    """Twice the reflectance: 100 % brighter everywhere."""
+    mi.set_variant(variant)
+    found = asp.compare(GREY, {"type": "diffuse", "reflectance": 0.5})
+    assert found.numbers["mean_relative_error"] == pytest.approx(1, rel=1e-6)
+    assert found.found.albedo_difference == pytest.approx(np.full(18, 0.25), rel=1e-6)
+    found.save(tmp_path / "a.json")
+    found.save(tmp_path / "a.png")
+    assert {path.name for path in tmp_path.iterdir()} == {"a.json", "a.png"} and mi.variant() == variant
+    with pytest.raises(asp.ParameterError, match="its ending has to be one of"):
+        found.save(tmp_path / "a.jpg")
+
+
 class Lambert(LobeModel):
     """A model of one's own."""
 
@@ -177,9 +201,7 @@ class Lambert(LobeModel):
         return [ByCosine(lambda wi, wo: albedo / dr.pi)]
 
 
-def test_a_model_of_ones_own(rgb, monkeypatch):
-    monkeypatch.setattr(models, "MODELS", dict(models.MODELS))
-    monkeypatch.setattr("asperity.plugin.MODELS", models.MODELS)
+def test_a_model_of_ones_own(rgb, registry):
     assert asp.register(Lambert) is Lambert
     for variant in ("llvm_ad_rgb", "llvm_ad_mono"):
         mi.set_variant(variant)
@@ -209,10 +231,15 @@ BAD = {
     "NaN": (lambda: asp.sample(GREY, (np.nan, 0), 5), r"wi\[0\] = \(nan, 0\)"),
     "shape": (lambda: asp.evaluate(GREY, [1], UP), r"wi has the shape \(1,\)"),
     "out": (lambda: asp.pdf(GREY, UP, UP, out=np.zeros((2,))), "out has the shape"),
+    "no array": (lambda: asp.pdf(GREY, UP, UP, out=[0]), "out: expected an array of floating-point numbers"),
+    "integers": (lambda: asp.evaluate(GREY, UP, UP, out=np.zeros(3, int)), "out: expected an array of floating"),
+    "seed": (lambda: asp.sample(GREY, UP, 5, seed=-1), "seed = -1: expected a whole number, at least 0"),
+    "words": (lambda: asp.evaluate(GREY, UP, UP, wavelengths=["red"]), r"wavelengths = \['red'\]: expected a list"),
     "theta": (lambda: asp.albedo(GREY, 100), r"theta\[0\] = \(100, 0\): .* within \[0, 90\]"),
+    "glass": (lambda: asp.albedo({"type": "roughdielectric"}, 100), r"theta\[0\] = \(100, 0\): .* within \[0, 90\]"),
     "word": (lambda: asp.albedo(GREY, "up"), "theta and phi: expected numbers"),
     "samples": (lambda: asp.albedo(GREY, 0, samples=100), "samples = 100: expected a power of two"),
-    "n": (lambda: asp.sample(GREY, UP, 0), "n = 0: expected a whole number above 0"),
+    "n": (lambda: asp.sample(GREY, UP, 0), "n = 0: expected a whole number, at least 1"),
     "nm": (lambda: asp.evaluate(GREY, UP, UP, wavelengths=[300]), r"wavelengths = \[300\]: expected a list of numbers"),
     "no nm": (lambda: asp.evaluate(GREY, UP, UP, wavelengths=[]), r"wavelengths = \[\]"),
     "many nm": (lambda: asp.sample(GREY, UP, 1, wavelengths=NM), "6 of them, and a sample has at most 4"),
@@ -232,6 +259,7 @@ BAD = {
     "option": (lambda: asp.plot(GREY, theta_i=[3]), "theta_i: makes no sense with view lobes"),
     "paper": (lambda: asp.validate("vgrove", "nowhere"), "Did you mean 'vgroove'"),
     "no model": (lambda: asp.register(int), "expected a class derived from asperity.lobes.LobeModel"),
+    "a texture's": (lambda: asp.register(Lambert, "settled"), "name = 'settled': there is such a plugin already"),
     "our name": (lambda: asp.register(Lambert, "vgroove"), "name = 'vgroove': there is such a plugin already"),
     "Mitsuba's": (lambda: asp.register(Lambert, "diffuse"), "name = 'diffuse': there is such a plugin already"),
 }

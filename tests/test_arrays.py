@@ -87,7 +87,7 @@ def test_the_horizon_is_above():
     "options, message",
     [
         ({"out": np.empty((3, 3))}, r"out has the shape \(3, 3\): expected \(4, 2\)"),
-        ({"chunk": 0}, "chunk = 0: expected a whole number above 0"),
+        ({"chunk": 0}, "chunk = 0: expected a whole number, at least 1"),
         ({"chunk": 1.5}, "chunk = 1.5"),
     ],
 )

@@ -83,6 +83,7 @@ def test_settings():
     assert found["tau_0"] == 0.4 and found["base"]["reflectance"]["value"] == [1, 0, 0]
     inside = {"type": "twosided", "inside": GREY}
     assert resolve(inside, {"inside.reflectance": 1}).description["inside"]["reflectance"] == 1
+    assert resolve(GREY, "reflectance=.5").description["reflectance"] == 0.5
     assert inside["inside"] is GREY and GREY["reflectance"] == 0.25
 
 
@@ -114,6 +115,7 @@ BAD = {
     "no file": ("none.json", UnreadableFileError, "there is no such file"),
     "a folder": ("folder", UnreadableFileError, "'folder': it is a folder"),
     "another ending": ("picture.png", UnreadableFileError, "its ending is '.png'"),
+    "a long name": ("x/" * 3000, UnreadableFileError, "its ending is ''"),
     "a far folder": ("./x/y", UnreadableFileError, "its ending is ''"),
     "broken JSON": ('{"type": ', ParameterError, "material '{\"type\":': line 1, column 9"),
     "JSON, no BSDF": ("[1]", ParameterError, "it is [1], not an object"),

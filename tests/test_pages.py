@@ -22,6 +22,7 @@ SMALL = {
     "render": ["--size", "16", "--spp", "1"],
     "check": ["--only", "finiteness"],
     "measure": ["--paths", "1e4", "--tiles", "2"],
+    "compare": ["--no-preview"],
 }
 """Makes a command fast: the last of an option's values counts."""
 
@@ -46,7 +47,7 @@ def run(line):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["start", "checks"])
+@pytest.mark.parametrize("name", ["start", "checks", "plotting", "goniophotometer"])
 def test_a_page_can_be_followed(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}

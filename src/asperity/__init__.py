@@ -16,7 +16,21 @@ from .errors import AsperityError, ParameterError, UnknownNameError, UnreadableF
 from .version import __version__
 
 if TYPE_CHECKING:
-    from .api import albedo, check, evaluate, material, measure, pdf, plot, presets, register, render, sample, validate
+    from .api import (
+        albedo,
+        check,
+        compare,
+        evaluate,
+        material,
+        measure,
+        pdf,
+        plot,
+        presets,
+        register,
+        render,
+        sample,
+        validate,
+    )
 
 LAZY = (
     "evaluate",
@@ -28,6 +42,7 @@ LAZY = (
     "validate",
     "render",
     "plot",
+    "compare",
     "presets",
     "material",
     "register",
@@ -42,6 +57,7 @@ __all__ = [
     "__version__",
     "albedo",
     "check",
+    "compare",
     "evaluate",
     "llvm",
     "material",

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import drjit as dr
 import mitsuba as mi
@@ -26,15 +26,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from . import drawing, goniophotometer, loading, models, plugin, validation
+from . import drawing, goniophotometer, loading, models, plugin, validation, variants
 from .arrays import CHUNK, Array, Directions, mapped
-from .errors import ParameterError, refuse_unused
+from .drawing import comparison
+from .errors import ParameterError, refuse_unused, whole
 from .goniophotometer.mesh import MESHES
 from .lab import checks
 from .lab import evaluate as lab
-from .materials import Material, resolve
+from .materials import ABOVE, Material, resolve
 from .parameters import Declared
-from .results import Checks, Picture, Samples
+from .results import Checks, Compared, Picture, Samples
 from .scenes import presets as _presets
 
 NM = (360.0, 830.0)
@@ -43,6 +44,7 @@ SOBOL = 2**14
 """Samples of an albedo: of smooth BSDFs it has four digits then."""
 
 material = resolve
+Model = TypeVar("Model")
 
 
 def evaluate(
@@ -66,7 +68,7 @@ def evaluate(
         def values(i: Array, o: Array) -> Array:
             return target.channels(lambda si: target.bsdf.eval(mi.BSDFContext(), si, lab.vectors(o)), i)
 
-        return mapped(values, target.directions(wi=wi, wo=wo), target.width, out, chunk)
+        return mapped(values, [target.incident("wi", wi), target.outgoing("wo", wo)], target.width, out, chunk)
 
 
 def pdf(material: Any, wi: ArrayLike, wo: ArrayLike, *, out: Any = None, chunk: int = CHUNK) -> Array:
@@ -80,8 +82,8 @@ def pdf(material: Any, wi: ArrayLike, wo: ArrayLike, *, out: Any = None, chunk: 
             si = lab.interaction(lab.vectors(i), len(i), target.groups[0])
             return lab.to_numpy(target.bsdf.pdf(mi.BSDFContext(), si, lab.vectors(o)), len(i)).T
 
-        directions = target.directions(wi=wi, wo=wo)
-        return mapped(values, directions, 1, None if out is None else out[..., None], chunk)[..., 0]
+        directions = [target.incident("wi", wi), target.outgoing("wo", wo)]
+        return mapped(values, directions, 1, out[..., None] if isinstance(out, np.ndarray) else out, chunk)[..., 0]
 
 
 def albedo(
@@ -96,16 +98,17 @@ def albedo(
 
     It is the mean weight of ``samples`` points of Sobol's sequence, a power of two: the same in every call.
     """
-    if not (isinstance(samples, int) and samples > 0 and samples & (samples - 1) == 0):
-        raise ParameterError(f"samples = {samples!r}: expected a power of two, such as {SOBOL}.")
+    samples = whole("samples", samples, 1)
+    if samples & (samples - 1):
+        raise ParameterError(f"samples = {samples}: expected a power of two, such as {SOBOL}.")
     with _loaded(material, wavelengths) as target:
-        angles = target.directions(theta=_angles(theta, phi))
+        angles = Directions("theta", _angles(theta, phi), *target.incidence)
 
         def values(i: Array) -> Array:
             found = [lab.albedo(target.bsdf, i, samples, group) for group in target.groups]
             return np.concatenate(found)[: target.width].T
 
-        return mapped(values, angles, target.width, chunk=max(1, CHUNK // samples))
+        return mapped(values, [angles], target.width, chunk=max(1, CHUNK // samples))
 
 
 def sample(
@@ -122,9 +125,7 @@ def sample(
     The same ``seed`` gives the same directions, whatever the chunk. All channels share a direction, so there are at
     most as many ``wavelengths`` as a spectral variant has channels.
     """
-    if not (isinstance(n, int) and n > 0):
-        raise ParameterError(f"n = {n!r}: expected a whole number above 0.")
-    random = np.random.default_rng(seed)
+    n, random = whole("n", n, 1), np.random.default_rng(whole("seed", seed, 0))
     with _loaded(material, wavelengths) as target:
         if len(target.groups) > 1:
             most = dr.size_v(mi.UnpolarizedSpectrum)
@@ -137,22 +138,22 @@ def sample(
             parts = (bs.wo, bs.pdf, mi.unpolarized_spectrum(weight))
             return np.concatenate([lab.to_numpy(part, len(i)) for part in parts])[: 4 + target.width].T
 
-        [given] = target.directions(wi=wi)
-        found = mapped(values, [given.repeated(n)], 4 + target.width, chunk=chunk)
+        found = mapped(values, [target.incident("wi", wi).repeated(n)], 4 + target.width, chunk=chunk)
         return Samples(found[..., :3], found[..., 4:], found[..., 3])
 
 
 def check(
     material: Any,
-    only: Sequence[str] = checks.NAMES,
+    only: str | Sequence[str] = checks.NAMES,
     *,
     progress: Callable[[str, int, int], None] = checks.quiet,
 ) -> Checks:
     """Check what every BSDF must obey: sampling, reciprocity, energy, gradients and more; see `lab.checks`."""
-    _ensure_variant()
+    variants.ensure()
     found = resolve(material)
     bsdf = found.load()
-    return Checks(found.name, tuple(checks.check(found.description or bsdf, progress, only)))
+    names = [only] if isinstance(only, str) else only
+    return Checks(found.name, tuple(checks.check(found.description or bsdf, progress, names)))
 
 
 def measure(
@@ -172,26 +173,28 @@ def measure(
     ``periodic``: `goniophotometer.Mesh` says how; heights need the ``spacing`` of their samples. ``options`` are those
     of `goniophotometer.measure`: paths, orders, apart, sensor, tiles, seed, ...
     """
-    _ensure_variant()
     surface = {"bsdf": bsdf, "spacing": spacing, "periodic": periodic}
-    given: dict[str, Any] = {name: value for name, value in surface.items() if value is not None}
-    about: dict[str, Any] = {}
-    if isinstance(what, (str, Path)) and Path(what).suffix.lower() in MESHES:
-        geometry: Any = goniophotometer.from_file("mesh", what, **given)
-    elif isinstance(what, np.ndarray):
-        if spacing is None:
-            raise ParameterError("spacing: heights need the distance between them.")
-        geometry = goniophotometer.HeightField(what, **given)
-    else:
-        refuse_unused(surface, (), "what is neither a mesh nor heights")
-        geometry = what
-        if not hasattr(what, "piece"):
-            found = resolve(what)
-            found.load()
-            geometry = models.microgeometry(found.description or {"type": found.name})
-            about = {"model": found.description}
     incident = [(float(t), float(p)) for t, p in _angles(theta, phi).reshape(-1, 2)]
-    return goniophotometer.measure(geometry, incident, **{"about": about} | options)
+    with variants.switched(variants.of_arrays(options.get("wavelengths") is not None)):
+        geometry, about = _microgeometry(what, surface)
+        return goniophotometer.measure(geometry, incident, **{"about": about} | options)
+
+
+def _microgeometry(what: Any, surface: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """What to trace light through, and what to note about it; ``surface`` holds options of meshes and heights."""
+    given: dict[str, Any] = {name: value for name, value in surface.items() if value is not None}
+    if isinstance(what, (str, Path)) and Path(what).suffix.lower() in MESHES:
+        return goniophotometer.from_file("mesh", what, **given), {}
+    if isinstance(what, np.ndarray):
+        if "spacing" not in given:
+            raise ParameterError("spacing: heights need the distance between them.")
+        return goniophotometer.HeightField(what, **given), {}
+    refuse_unused(surface, (), "what is neither a mesh nor heights")
+    if hasattr(what, "piece"):
+        return what, {}
+    found = resolve(what)
+    found.load()
+    return models.microgeometry(found.description or {"type": found.name}), {"model": found.description}
 
 
 def validate(model: str, folder: str | Path, *, quick: bool = False, **options: Any) -> validation.Report:
@@ -199,7 +202,7 @@ def validate(model: str, folder: str | Path, *, quick: bool = False, **options: 
 
     It takes minutes, ``quick`` a tenth of them; ``options`` are those of `validation.validate`.
     """
-    _ensure_variant()
+    variants.ensure()
     return validation.validate(model, folder, quick=quick, **options)
 
 
@@ -217,11 +220,11 @@ def render(
     """
     from .scenes.preview import preview
 
-    _ensure_variant()
+    variants.ensure()
     width, height = size if isinstance(size, tuple) else (size, size)
-    for name, value in {"width": width, "height": height, "spp": spp}.items():
-        if not (isinstance(value, int) and 0 < value <= 2**15):
-            raise ParameterError(f"{name} = {value!r}: expected a whole number in [1, {2**15}].")
+    for name, value, most in (("width", width, 2**15), ("height", height, 2**15), ("spp", spp, 2**31)):
+        whole(name, value, 1, most)
+    whole("seed", seed, 0, 2**32 - 1)
     found = resolve(material)
     bsdf = found.load()
     scene = loading.load(preview(found.description or bsdf, size=(width, height), **found.preview | view))
@@ -231,11 +234,22 @@ def render(
 def plot(*materials: Any, view: str = "lobes", **options: Any) -> Figure:
     """A figure of one or several materials, for its ``savefig``; ``view`` and ``options`` are those of `drawing.plot`.
 
-    In spectral variants, or where the option ``wavelengths`` asks for one, at these wavelengths.
+    The view ``spectrum``, and the option ``wavelengths``, are answered in a spectral variant; measurements, in one with
+    their channels.
     """
-    active = _ensure_variant()
-    with _variant(_arrays(active, options.get("wavelengths") is not None)):
-        return drawing.plot([resolve(material) for material in materials], view, **options)
+    found = [resolve(material) for material in materials]
+    with variants.switched(variants.of(found, view == "spectrum" or options.get("wavelengths") is not None)):
+        return drawing.plot(found, view, **options)
+
+
+def compare(a: Any, b: Any) -> Compared:
+    """How far material ``b`` is from ``a``, the reference: numbers, values over all directions, and a figure.
+
+    Measurements are compared in their own directions, and with the noise that they know of.
+    """
+    first, second = found = resolve(a), resolve(b)
+    with variants.switched(variants.of(found)):
+        return Compared(first, second, comparison.compare(first, second, drawing.distinct_names(found)))
 
 
 def presets() -> dict[str, Material]:
@@ -243,7 +257,7 @@ def presets() -> dict[str, Material]:
     return {name: resolve(name) for name in _presets.names()}
 
 
-def register(model: type, name: str | None = None) -> type:
+def register(model: type[Model], name: str | None = None) -> type[Model]:
     """Make a model of one's own, derived from `lobes.LobeModel`, a plugin; returns it, so that it can decorate.
 
     It is called ``name``, or as its class in small letters. In every variant, at once and from now on. A model that was
@@ -252,7 +266,8 @@ def register(model: type, name: str | None = None) -> type:
     if not (isinstance(model, type) and issubclass(model, Declared)):
         raise ParameterError(f"model = {model!r}: expected a class derived from asperity.lobes.LobeModel.")
     name = name or model.__name__.lower()
-    taken = name in models.MODELS and not getattr(models.MODELS[name], "registered", False)
+    known = models.MODELS | models.TEXTURES | models.PHASES
+    taken = name in known and not getattr(known[name], "registered", False)
     if taken or mi.PluginManager.instance().plugin_type(name) != mi.ObjectType.Unknown:
         raise ParameterError(f"name = {name!r}: there is such a plugin already. Take another.")
     model.registered = True  # type: ignore[attr-defined]
@@ -271,20 +286,21 @@ class _Loaded(NamedTuple):
     """Wavelengths, as many at a time as the variant has channels; one group, None, if it has none."""
     width: int
     """Channels that are asked for."""
-    measured: tuple[float, float]
-    """Range of θi, in degrees, where there are values."""
+    incidence: tuple[float, float]
+    """Range of θi, in degrees, where there are values of light from above."""
 
-    def directions(self, **given: Any) -> list[Directions]:
-        """Directions by the name of their parameter, which have to be where this BSDF has values."""
-        flags = self.bsdf.flags()
-        through = mi.has_flag(flags, mi.BSDFFlags.Transmission) or mi.has_flag(flags, mi.BSDFFlags.BackSide)
-        high, reason = (180.0, "") if through else (90.0, f": {self.name} has no values below its surface")
-        return [
-            Directions(name, array, high=high, reason=reason)
-            if name == "wo" or self.measured == (0.0, 90.0)
-            else Directions(name, array, *self.measured, f": there {self.name} was measured")
-            for name, array in given.items()
-        ]
+    def outgoing(self, name: str, given: ArrayLike) -> Directions:
+        """Directions, the parameter ``name``, on the sides of the surface where this BSDF has values."""
+        sides = mi.BSDFFlags.Transmission, mi.BSDFFlags.BackSide
+        if any(mi.has_flag(self.bsdf.flags(), side) for side in sides):
+            return Directions(name, given)
+        return Directions(name, given, high=90, reason=f": {self.name} has no values below its surface")
+
+    def incident(self, name: str, given: ArrayLike) -> Directions:
+        """The same, where it was measured, if it was."""
+        if self.incidence == ABOVE:
+            return self.outgoing(name, given)
+        return Directions(name, given, *self.incidence, f": there {self.name} was measured")
 
     def channels(self, function: Callable[[Any], Any], wi: Array) -> Array:
         """What ``function`` of the surface interaction gives, (n, channels), at all wavelengths."""
@@ -299,39 +315,12 @@ def _loaded(material: Any, wavelengths: Sequence[float] | None = None, colourles
 
     In a spectral variant these have to be, unless what is asked for is ``colourless``.
     """
-    found, active = resolve(material), _ensure_variant()
-    with _variant(_arrays(active, wavelengths is not None)):
+    found = resolve(material)
+    with variants.switched(variants.of_arrays(wavelengths is not None)):
         channels = dr.size_v(mi.UnpolarizedSpectrum)
         chosen = _wavelengths(wavelengths, channels if colourless else 0)
         groups: list[Any] = [_filled(chosen[k : k + channels], channels) for k in range(0, len(chosen), channels)]
-        theta = (0.0, 90.0) if found.measured is None else tuple(found.measured.incident[[0, -1], 0])
-        yield _Loaded(found.name, found.load(), groups or [None], len(chosen) or channels, theta)
-
-
-def _arrays(variant: str, wavelengths: bool) -> str:
-    """The variant like this one that computes arrays, and wavelengths, if they are asked for."""
-    found = variant.replace("scalar_", "llvm_ad_")
-    return f"{found.partition('_')[0]}_ad_spectral" if wavelengths and "spectral" not in found else found
-
-
-@contextmanager
-def _variant(wanted: str) -> Iterator[None]:
-    """That variant, for a while."""
-    active = mi.variant()
-    try:
-        if wanted != active:
-            mi.set_variant(wanted)
-        yield
-    finally:
-        if wanted != active:
-            mi.set_variant(active)
-
-
-def _ensure_variant() -> str:
-    """The active variant; ``llvm_ad_rgb``, from now on, if there is none."""
-    if mi.variant() is None:
-        mi.set_variant("llvm_ad_rgb")
-    return str(mi.variant())
+        yield _Loaded(found.name, found.load(), groups or [None], len(chosen) or channels, found.incidence)
 
 
 def _wavelengths(given: Sequence[float] | None, default: int) -> tuple[float, ...]:
@@ -342,7 +331,10 @@ def _wavelengths(given: Sequence[float] | None, default: int) -> tuple[float, ..
         return tuple(np.linspace(450, 650, default))
     if given is None:
         raise ParameterError(f"wavelengths: variant {mi.variant()} needs them, in nm; [450, 550, 650], say.")
-    array = np.asarray(given, dtype=np.float64)
+    try:
+        array = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
     if array.ndim != 1 or not array.size or not np.all((array >= NM[0]) & (array <= NM[1])):
         raise ParameterError(f"wavelengths = {loading.short(given)}: expected a list of numbers in {list(NM)} nm.")
     return tuple(array.tolist())

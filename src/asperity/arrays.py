@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import ParameterError
+from .errors import ParameterError, whole
 
 Array = NDArray[np.float64]
 CHUNK = 2**20
@@ -93,16 +93,17 @@ def mapped(
 
     The directions are broadcast. ``out`` is an array of that shape to write to; a ``np.memmap``, say.
     """
-    if not (isinstance(chunk, int) and chunk > 0):
-        raise ParameterError(f"chunk = {chunk!r}: expected a whole number above 0.")
+    chunk = whole("chunk", chunk, 1)
     try:
         shape = np.broadcast_shapes(*(each.shape for each in directions))
     except ValueError:
         shapes = " and ".join(f"{each.name} of {each.array.shape}" for each in directions)
         raise ParameterError(f"{shapes}: these shapes do not go together, but for their last axis.") from None
     result = np.empty((*shape, width)) if out is None else out
-    if np.shape(result) != (*shape, width):
-        raise ParameterError(f"out has the shape {np.shape(result)}: expected {(*shape, width)}.")
+    if not (isinstance(result, np.ndarray) and result.dtype.kind == "f" and result.flags.writeable):
+        raise ParameterError("out: expected an array of floating-point numbers that may be written to.")
+    if result.shape != (*shape, width):
+        raise ParameterError(f"out has the shape {result.shape}: expected {(*shape, width)}.")
     target, shape = (result, shape) if shape else (result[None], (1,))
     for index in pieces(shape, chunk):
         target[index] = function(*(each.at(shape, index) for each in directions))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Collection, Mapping
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -53,11 +55,19 @@ def refuse_unused(options: Mapping[str, Any], used: Collection[str], what: str) 
             raise ParameterError(f"{option}: makes no sense with {what}.")
 
 
+def whole(name: str, value: Any, least: int, most: int = 2**63 - 1) -> int:
+    """A whole number of any type, NumPy's too, within a range; raises ParameterError."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
+        end = "" if most == 2**63 - 1 else f" and at most {most}"
+        raise ParameterError(f"{name} = {value!r}: expected a whole number, at least {least}{end}.")
+    return int(value)
+
+
 def readable(what: str, path: str | Path, formats: Collection[str]) -> Path:
     """The path of an existing file whose ending is one of ``formats``."""
     path = Path(path)
     if path.suffix.lower() not in formats:
         raise UnreadableFileError(what, path, formats, f"its ending is {path.suffix!r}")
-    if not path.is_file():
+    if not os.path.isfile(path):  # which no name is too long for
         raise UnreadableFileError(what, path, formats, "there is no such file")
     return path

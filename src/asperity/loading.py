@@ -363,7 +363,7 @@ def _file(given: dict[str, Any], name: str, folder: Path | None) -> None:
         raise ParameterError(f"{name}: there is no file {filename!r}.")
     try:
         if plugin in ("measured", "measured_polarized"):
-            _tensors(path)
+            tensors(path)
         elif mi.variant() and plugin in MESHES:
             mesh(path, **{key: given[key] for key in ("shape_index",) if key in given})
         elif mi.variant() and plugin in ("bitmap", "envmap") and path.suffix.lower() not in EIGHT_BITS:
@@ -372,13 +372,16 @@ def _file(given: dict[str, Any], name: str, folder: Path | None) -> None:
         raise ParameterError(f"{name}: {error}") from error
 
 
-def _tensors(path: Path) -> None:
-    """Refuse a file of tensors that is not all there: Mitsuba would take what lies beyond its end in memory."""
+def tensors(path: Path) -> dict[str, NDArray[Any]]:
+    """What a file of tensors holds, if it is all there: Mitsuba would take what lies beyond its end in memory.
+
+    Raises UnreadableFileError.
+    """
     from mitsuba.python import tensor_io
 
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            fields = tensor_io.read(str(path))
+            fields: dict[str, NDArray[Any]] = tensor_io.read(str(path))
     except Exception as error:  # it checks little: anything may go wrong in a damaged file
         raise _damaged("measurement", path, TENSORS, f"it is cut short, or damaged ({error})") from error
     for name, data in fields.items():
@@ -388,6 +391,7 @@ def _tensors(path: Path) -> None:
             raise _damaged("measurement", path, TENSORS, f"its {name!r} is below 0")
         if name in ("theta_i", "phi_i", "wavelengths") and (np.diff(data) <= 0).any():
             raise _damaged("measurement", path, TENSORS, f"its {name!r} does not increase")
+    return fields
 
 
 def _damaged(what: str, path: Path, formats: Iterable[str], reason: str) -> UnreadableFileError:

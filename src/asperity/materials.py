@@ -6,6 +6,8 @@ A material is one of:
 - a file: a description in JSON, or Mitsuba's XML; a measurement, ``.npz`` of ours or ``.bsdf`` of RGL's;
 - a text, the JSON or XML itself;
 - in Python, also a dictionary, a `Measurement`, or a loaded ``mi.BSDF``.
+
+Commands import this before they run, so that it imports nothing heavy itself.
 """
 
 from __future__ import annotations
@@ -19,7 +21,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import loading, xml
 from .errors import ParameterError, UnknownNameError, UnreadableFileError, readable, suggestion
 from .scenes import presets
 
@@ -31,6 +32,8 @@ Description = dict[str, Any]
 TENSORS = {".bsdf": "measured", ".pbsdf": "measured_polarized"}
 """Mitsuba's plugins for measurements, by the endings of their files."""
 FORMATS = (".json", ".xml", ".npz", *TENSORS)
+ABOVE = (0.0, 90.0)
+"""θ, in degrees, of all directions above a surface."""
 TRIED = (
     f"Tried: presets, models, Mitsuba's BSDFs, and files ({', '.join(FORMATS)}). `asperity list` shows presets and "
     "models."
@@ -50,6 +53,21 @@ class Material:
     preview: dict[str, Any] = field(default_factory=dict)
     measured: Measurement | None = None
 
+    @property
+    def incidence(self) -> tuple[float, float]:
+        """The range of θi, in degrees, that was measured; beyond it Mitsuba would repeat the last values."""
+        import numpy as np
+
+        from . import loading
+
+        if self.measured is not None:
+            theta = self.measured.incident[:, 0]
+        elif self.description is not None and self.description.get("type") in TENSORS.values():
+            theta = np.degrees(loading.tensors(Path(self.description["filename"]))["theta_i"])
+        else:
+            return ABOVE
+        return float(theta.min()), float(theta.max())
+
     def load(self) -> Any:
         """The ``mi.BSDF`` of the active variant; raises ParameterError if there is none.
 
@@ -57,6 +75,7 @@ class Material:
         """
         import mitsuba as mi
 
+        from . import loading
         from .lab.evaluate import active_variant
 
         active_variant()
@@ -81,6 +100,7 @@ def resolve(what: Any, settings: Iterable[str] | Mapping[str, Any] = ()) -> Mate
     No variant needs to be set. Raises UnknownNameError, UnreadableFileError or ParameterError.
     """
     found = _found(what)
+    settings = [settings] if isinstance(settings, str) else settings
     if not settings:
         return found
     if found.description is None:
@@ -134,7 +154,9 @@ def _from_name(name: str) -> Material:
 
 
 def _from_file(path: Path) -> Material:
-    if path.is_dir():
+    from . import loading, xml
+
+    if os.path.isdir(path):
         raise UnreadableFileError("material", path, FORMATS, "it is a folder")
     readable("material", path, FORMATS)
     ending = path.suffix.lower()
@@ -157,6 +179,8 @@ def _from_file(path: Path) -> Material:
 
 def _from_text(text: str) -> Material:
     """JSON or XML; files that it names are looked for in the current folder."""
+    from . import loading, xml
+
     try:
         if text.startswith("<"):
             description, preview = xml.bsdf(text), {}
@@ -175,6 +199,7 @@ def _is_plugin(name: str) -> bool:
     """
     import mitsuba as mi
 
+    from . import loading
     from .models import MODELS
 
     if name in MODELS or mi.PluginManager.instance().plugin_type(name) != mi.ObjectType.Unknown:
@@ -201,6 +226,7 @@ def _names() -> list[str]:
 
 def _interpolated(measured: Measurement) -> Any:
     """The measurement as a BSDF of the active variant."""
+    from . import loading
     from .goniophotometer import tensor_file
 
     with tempfile.TemporaryDirectory(prefix="asperity-") as folder:
@@ -211,6 +237,8 @@ def _interpolated(measured: Measurement) -> Any:
 
 def changed(description: Description, settings: Iterable[str] | Mapping[str, Any]) -> Description:
     """A description with other parameters. Whether they exist is for the plugin to say; raises ParameterError."""
+    from . import loading
+
     changes = settings.items() if isinstance(settings, Mapping) else map(_setting, settings)
     result = _copied(description)
     for path, new in changes:

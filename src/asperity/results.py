@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,16 +12,20 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from . import drawing, variants
 from .errors import ParameterError
 from .files import atomically
 from .lab import pictures
 from .lab.checks import Result
+from .lab.compare import Comparison
+from .materials import Material
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 PICTURES = (".png", ".exr")
+FIGURES = (".png", ".pdf", ".svg", ".json")
 
 
 class Samples(NamedTuple):
@@ -75,6 +80,33 @@ class Checks:
 
 
 @dataclass(frozen=True)
+class Compared:
+    """Two materials, the first of which is the reference, and what was found; ``found`` holds values, by direction."""
+
+    a: Material
+    b: Material
+    found: Comparison
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Mean and worst relative error and where, difference of albedos, RMS of log-cosine errors, by name."""
+        return self.found.numbers()
+
+    def plot(self) -> Figure:
+        """A figure: maps, their relative difference, slices, albedos."""
+        with variants.switched(variants.of([self.a, self.b])):
+            return drawing.compared(self.a, self.b, self.found)
+
+    def save(self, path: str | Path) -> None:
+        """Write the figure, as PNG, PDF or SVG, or the numbers, as JSON; by the ending."""
+        path = _writable(path, FIGURES)
+        if path.suffix.lower() != ".json":
+            return drawing.style.save(self.plot(), path)
+        with atomically(path) as part:
+            part.write_text(json.dumps(self.numbers, indent=2) + "\n", encoding="utf-8")
+
+
+@dataclass(frozen=True)
 class Picture:
     """A rendered image: linear radiance, float32 (height, width, 3), of R, G and B."""
 
@@ -93,11 +125,7 @@ class Picture:
 
     def save(self, path: str | Path) -> None:
         """Write a PNG, in sRGB and clipped at 1, or an EXR, of what there is; by the ending."""
-        path = Path(path)
-        if path.suffix.lower() not in PICTURES:
-            raise ParameterError(f"path = {str(path)!r}: its ending has to be one of {', '.join(PICTURES)}.")
-        if not path.absolute().parent.is_dir():
-            raise ParameterError(f"path = {str(path)!r}: there is no folder {str(path.parent)!r}.")
+        path = _writable(path, PICTURES)
         with atomically(path) as part:
             self._bitmap(path.suffix.lower()).write(str(part))
 
@@ -106,3 +134,13 @@ class Picture:
         if ending == ".exr":
             return bitmap
         return bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, srgb_gamma=True)
+
+
+def _writable(path: str | Path, formats: tuple[str, ...]) -> Path:
+    """The path of a file that may be written; raises ParameterError."""
+    path = Path(path)
+    if path.suffix.lower() not in formats:
+        raise ParameterError(f"path = {str(path)!r}: its ending has to be one of {', '.join(formats)}.")
+    if not path.absolute().parent.is_dir():
+        raise ParameterError(f"path = {str(path)!r}: there is no folder {str(path.parent)!r}.")
+    return path

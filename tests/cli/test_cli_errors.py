@@ -51,6 +51,8 @@ BAD = [
     (("render", "-o", "none/out.png"), "cannot write into the folder 'none'"),
     (("render", "-o", "null.json/out.png"), "cannot write into the folder 'null.json'"),
     (("render", "-o", "out.jpg"), "'.jpg'. Allowed: .png, .exr"),
+    (("render", "glided"), "unknown material 'glided'. Did you mean 'gilded'?"),
+    (("render", "gilded", "--preset", "gilded"), "give one of them"),
     (("render", "none.xml"), "'none.xml': there is no such file"),
     (("render", "binary.png"), "its ending is '.png'"),
     (("render", "comma.json"), "'comma.json': line 2, column"),

@@ -178,6 +178,12 @@ def test_ctrl_c_keeps_the_picture(asperity, tmp_path, monkeypatch):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.parametrize("material", ["diffuse", '{"type": "diffuse", "reflectance": 0.9}'])
+def test_a_material_by_its_name_or_text(asperity, tmp_path, material):
+    result = asperity("render", material, "--set", "reflectance=0.2", *TINY, "-o", "out.png")
+    assert result.exit_code == 0 and (tmp_path / "out.png").is_file(), result.output
+
+
 def test_a_turntable_is_a_folder_of_frames(asperity, tmp_path):
     result = asperity("render", "--preset", "gilded", "--object", "knot", "--turntable", "3", *TINY)
     assert result.exit_code == 0, result.output

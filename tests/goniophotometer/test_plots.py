@@ -2,6 +2,7 @@
 
 import asperity  # noqa: F401  isort: skip
 import mitsuba as mi
+import numpy as np
 import pytest
 
 from asperity.errors import ParameterError
@@ -38,3 +39,27 @@ def test_a_model_needs_the_channels_that_were_measured(rgb, variant):
     mi.set_variant(variant)
     with pytest.raises(ParameterError, match=f"variant {variant}.*R, G, B were measured"):
         plots.figure(measured, GREY)
+
+
+@pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.kind)
+@pytest.mark.parametrize("model", [GREY, None], ids=["model", "alone"])
+def test_many_directions_are_drawn_small(rgb, sensor, model):
+    """In three diagrams, not three for each: 144 took over a minute, and more than Matplotlib's 2^16 pixels."""
+    angles = [(theta, phi) for theta in (0, 20, 40, 60) for phi in (0, 90, 180, 270)]
+    grains = ExplicitGrains(0.5, grain=GREY, base=GREY, grains=16)
+    measured = measure(grains, angles, sensor=sensor, paths=2**10, tiles=4)
+    figure = plots.figure(measured, model)
+    diagrams = [axes for part in figure.subfigs for axes in part.axes if axes.get_label() != "<colorbar>"]
+    assert len(diagrams) == 3 and [len(axes.images) for axes in diagrams] == [1, 1, 0]
+    assert [text.get_text() for text in diagrams[0].get_yticklabels()] == ["0°", "20°", "40°", "60°"]
+    assert [text.get_text() for text in diagrams[0].get_xticklabels()] == ["0°", "90°", "180°", "270°"]
+
+
+def test_small_discs_show_the_cells_from_above():
+    """Each cell's number, where its direction is: x to the right, y up."""
+    sensor = Hemisphere(4, 8)
+    disc = plots.small(sensor, np.arange(32.0), np.array([0, 0, 1.0]))
+    for cell, (x, y, z) in enumerate(sensor.directions(np.array([0, 0, 1.0]))[:, 0]):
+        r = np.sqrt(1 - z) / np.hypot(x, y)
+        row, column = ((1 - side * r * w) / 2 * plots.SMALL for side, w in ((1, y), (-1, x)))
+        assert disc[int(row), int(column)] == cell

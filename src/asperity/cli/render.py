@@ -44,7 +44,9 @@ def parse_size(text: str) -> tuple[int, int]:
 
 def render(
     ctx: typer.Context,
-    scene: Annotated[Path | None, typer.Argument(metavar="SCENE", help="A whole scene, XML or JSON.")] = None,
+    target: Annotated[
+        str | None, typer.Argument(metavar="MATERIAL", help="A preset, a BSDF, a measurement, JSON; or a scene's file.")
+    ] = None,
     preset: materials.PresetName = None,
     material: materials.MaterialFile = None,
     settings: materials.Settings = None,
@@ -83,13 +85,18 @@ def render(
     ] = None,
     force: output.Force = False,
 ) -> None:
-    """Render a material on the preview scene, or a scene file, to a PNG and an EXR.
+    """Render a material on the preview scene, or a scene file, XML or JSON, to a PNG and an EXR.
 
     The PNG of a preview is denoised, if pyoidn is there; an EXR holds what was rendered, to measure with, and after it
     the denoised colours if --denoise is given. The exit code is 1 if there are pixels that are not finite.
     """
     values = (object_, env, light, floor, crease, preset, material, settings, compare, turntable, all_, contact_sheet)
     given = {name: value for name, value in zip(PREVIEW, values) if value not in (None, [], False)}
+    scene = Path(target) if target and Path(target).suffix.lower() in scene_files.FORMATS else None
+    if target and not scene:
+        if preset or material:
+            raise ParameterError(f"{target!r}, --preset, --material: give one of them.")
+        given["preset"] = target
     if scene and given:
         raise ParameterError(f"--{', --'.join(given)}: a scene file has its own materials, objects and lights.")
     if not scene and (sensor or define):
@@ -101,7 +108,7 @@ def render(
         folder = ctx.with_resource(output.folder(out, default, force=force or all_))
         several(ctx, folder, given, quality, variant, again=force or not all_)
         return
-    inputs = (scene, material, env and Path(env), object_ and Path(object_), *(settings or []), *(define or []))
+    inputs = (scene, target, material, env and Path(env), object_ and Path(object_), *(settings or []), *(define or []))
     files = ctx.with_resource(output.files(out, output.NAME, output.FORMATS, force=force, inputs=inputs))
     single(ctx, files, scene, given, quality, variant, define or [])
     if not (scene or given):

@@ -24,10 +24,7 @@ def load(
     import mitsuba as mi
 
     from asperity import loading
-    from asperity.scenes import presets
 
-    if path.name in presets.names():
-        raise ParameterError(f"{path.name} is a preset, not a scene file: asperity render --preset {path.name}")
     readable("scene", path, FORMATS)
     if path.suffix.lower() == ".xml":
         scene = loading.load_file(path, **(defines or {}))
@@ -35,7 +32,7 @@ def load(
         mi.file_resolver().prepend(str(path.parent.resolve()))
         scene = loading.load(description(path, defines or {}))
     if not isinstance(scene, mi.Scene) or not scene.sensors():
-        raise UnreadableFileError("scene", path, FORMATS, "it is no scene with a sensor")
+        raise UnreadableFileError("scene", path, FORMATS, "it is no scene with a sensor; --material takes materials")
     if scene.integrator() is None:
         raise UnreadableFileError("scene", path, FORMATS, 'it has no integrator, such as {"type": "path"}')
     if sensor >= len(scene.sensors()):

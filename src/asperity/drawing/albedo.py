@@ -11,18 +11,19 @@ from matplotlib.figure import Figure
 
 from asperity.goniophotometer.sensors import check_angles, directions
 from asperity.lab import evaluate
+from asperity.materials import Material
 
 from . import curves, style, values
 from .values import Curve
 
 GRID = np.append(np.arange(0, 89, 2.0), [89.0, 89.7])
 """θi of the curves, in degrees."""
-SAMPLES = 2**12
+SAMPLES = 2**13
 """For each value."""
 
 
 def figure(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     *,
     phi: float = 0.0,
     parts: bool | None = None,
@@ -51,14 +52,14 @@ def figure(
     return curves.finish(made, [axes], [panel._replace(title=materials[0].name if len(materials) == 1 else "")])
 
 
-def over_incidence(material: Any, phi: float, wavelengths: Sequence[float] | None = None) -> Curve:
+def over_incidence(material: Material, phi: float, wavelengths: Sequence[float] | None = None) -> Curve:
     """The share of the light that is reflected upwards."""
     if material.measured is not None:
         return _measured(material, phi, *material.measured.total_albedo)
     return Curve(GRID, _sampled(material, phi, wavelengths))
 
 
-def parts_of(material: Any, phi: float, wavelengths: Sequence[float] | None = None) -> dict[str, Curve]:
+def parts_of(material: Material, phi: float, wavelengths: Sequence[float] | None = None) -> dict[str, Curve]:
     """What the albedo consists of, and what is transmitted, by name; nothing if it is all one."""
     if material.measured is not None:
         value, error = material.measured.albedo
@@ -83,7 +84,7 @@ def kind(flags: Any) -> str:
     return next((name for name, flag in kinds.items() if mi.has_flag(flags, flag)), "straight through")
 
 
-def _sampled(material: Any, phi: float, wavelengths: Sequence[float] | None, **which: Any) -> np.ndarray:
+def _sampled(material: Material, phi: float, wavelengths: Sequence[float] | None, **which: Any) -> np.ndarray:
     """Albedos (channels, angles)."""
     wi = directions([(theta, phi) for theta in GRID])
     if not mi.is_spectral:
@@ -95,7 +96,7 @@ def _sampled(material: Any, phi: float, wavelengths: Sequence[float] | None, **w
     return np.concatenate(found)[: len(wanted)]
 
 
-def _measured(material: Any, phi: float, value: np.ndarray, error: np.ndarray) -> Curve:
+def _measured(material: Material, phi: float, value: np.ndarray, error: np.ndarray) -> Curve:
     """Of numbers (directions, channels), those for light of this azimuth."""
     incident = values.incidence([material], None, phi, (), most=len(value))
     rows = [values.row(material, tuple(one)) for one in incident]

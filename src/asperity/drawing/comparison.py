@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from asperity.goniophotometer import against
+from asperity.goniophotometer import Hemisphere, against
 from asperity.lab import compare as lab_compare
 from asperity.lab.compare import FAINT, Comparison
+from asperity.materials import Material
 
 from . import curves, hemisphere, slices, style, values
 
@@ -29,7 +30,7 @@ class Previews(NamedTuple):
     flip: np.ndarray | None
 
 
-def compare(a: Any, b: Any, names: Sequence[str]) -> Comparison:
+def compare(a: Material, b: Material, names: Sequence[str]) -> Comparison:
     """Compare two materials, the first of which is the reference; a measurement, in its own directions.
 
     Raises ParameterError if that makes no sense.
@@ -41,20 +42,23 @@ def compare(a: Any, b: Any, names: Sequence[str]) -> Comparison:
     return lab_compare.compare(a.load(), b.load(), names)
 
 
-def figure(materials: Sequence[Any], found: Comparison, previews: Previews | None = None) -> Figure:
+def figure(materials: Sequence[Material], found: Comparison, previews: Previews | None = None) -> Figure:
     """A figure of two loaded materials, the first of which is the reference, and of what `compare` found."""
     incident = values.incidence(materials, None, float(found.incident[0, 1]), ANGLES, most=len(ANGLES))
-    heights = [2.15, 2.2] + [1.85] * (previews is not None)
+    measured = [material.measured for material in materials if material.measured is not None]
+    whole = all(isinstance(one.sensor, Hemisphere) for one in measured)  # of windows and points there are no maps
+    heights = [2.15] * whole + [2.2] + [1.85] * (previews is not None)
     made = style.figure(style.PAGE, sum(heights))
-    parts = made.subfigures(len(heights), 1, height_ratios=heights)
-    maps(materials, found, incident[len(incident) // 2], parts[0].subplots(1, 3))
-    slices_and_albedo(materials, found, incident, parts[1])
+    parts = iter(made.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0])
+    if whole:
+        maps(materials, found, incident[len(incident) // 2], next(parts).subplots(1, 3))
+    slices_and_albedo(materials, found, incident, next(parts))
     if previews is not None:
-        pictures(materials, previews, parts[2])
+        pictures(materials, previews, next(parts))
     return made
 
 
-def maps(materials: Sequence[Any], found: Comparison, incident: np.ndarray, places: np.ndarray) -> None:
+def maps(materials: Sequence[Material], found: Comparison, incident: np.ndarray, places: np.ndarray) -> None:
     """Fill three axes: f cos θo of both, and the relative difference."""
     a, b = (hemisphere.over_disc(material, incident[None]).mean(axis=0)[0] for material in materials)
     norm = style.norm([a, b], "log")
@@ -74,12 +78,13 @@ def maps(materials: Sequence[Any], found: Comparison, incident: np.ndarray, plac
 
 
 def relative_map(
-    materials: Sequence[Any], found: Comparison, incident: np.ndarray, a: np.ndarray, b: np.ndarray
+    materials: Sequence[Material], found: Comparison, incident: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> np.ndarray:
     """b / a - 1 of the maps; where it was measured, of means over the same cells."""
     for material in materials:
         if material.measured is not None:
             sensor, k = material.measured.sensor, values.row(material, tuple(incident))
+            assert isinstance(sensor, Hemisphere)
             of_cells = found.relative[:, k].mean(axis=0)
             wo, relative = hemisphere.pixels(), np.full_like(a, np.nan)
             inside = wo[..., 2] > 0
@@ -91,7 +96,7 @@ def relative_map(
     return relative
 
 
-def slices_and_albedo(materials: Sequence[Any], found: Comparison, incident: np.ndarray, figure: Any) -> None:
+def slices_and_albedo(materials: Sequence[Material], found: Comparison, incident: np.ndarray, figure: Any) -> None:
     """Fill a row: slices in the plane of incidence, and the albedos."""
     names = [material.name for material in materials]
     planes = [values.in_plane(material, incident) for material in materials]
@@ -115,7 +120,7 @@ def slices_and_albedo(materials: Sequence[Any], found: Comparison, incident: np.
     style.legend(figure, places)
 
 
-def pictures(materials: Sequence[Any], previews: Previews, figure: Any) -> None:
+def pictures(materials: Sequence[Material], previews: Previews, figure: Any) -> None:
     """Fill a row: both previews, their difference, and FLIP's map if there is one."""
     places = figure.subplots(1, 4)
     for axes, material, image in zip(places, materials, (previews.a, previews.b)):

@@ -10,22 +10,25 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import Locator, LogLocator, MaxNLocator
 
 from asperity.errors import ParameterError
 from asperity.goniophotometer import Hemisphere
 from asperity.goniophotometer.sensors import directions
+from asperity.materials import Material
 
 from . import style, values
 
 SIZE = 320
 """Pixels along a side of a map."""
+MANY = 300
+"""Ratio of the ends of a logarithmic scale from which on isolines are sparse."""
 RINGS = (30, 60)
 """Degrees from the normal that are marked."""
 
 
 def figure(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     *,
     theta: Sequence[float] | None = None,
     phi: float = 0.0,
@@ -93,7 +96,7 @@ def pixels() -> np.ndarray:
 
 
 def over_disc(
-    material: Any, incident: np.ndarray, cosine: bool = True, wavelengths: Sequence[float] | None = None
+    material: Material, incident: np.ndarray, cosine: bool = True, wavelengths: Sequence[float] | None = None
 ) -> np.ndarray:
     """f |cos θo|, or f, at `pixels`: (channels, directions of incidence, SIZE, SIZE), NaN outside the disc."""
     wo = pixels()
@@ -107,14 +110,15 @@ def over_disc(
     return result
 
 
-def _measured_cells(material: Any, incident: np.ndarray, wo: np.ndarray) -> np.ndarray:
+def _measured_cells(material: Material, incident: np.ndarray, wo: np.ndarray) -> np.ndarray:
     """Values of the cells that directions (n, 3) fall into: (channels, directions of incidence, n)."""
-    sensor = material.measured.sensor
+    measured = values.measurement(material)
+    sensor = measured.sensor
     if not isinstance(sensor, Hemisphere):
         raise ParameterError(f"{material.name}: a {sensor.kind} was measured, not the hemisphere.")
     cell = cells(wo, sensor.rows, sensor.columns)
     chosen = [values.row(material, tuple(one)) for one in incident]
-    return np.moveaxis(material.measured.summed.value[chosen][:, cell], -1, 0)
+    return np.moveaxis(measured.summed.value[chosen][:, cell], -1, 0)
 
 
 def cells(wo: np.ndarray, rows: int, columns: int) -> np.ndarray:
@@ -154,7 +158,10 @@ def disc(axes: Axes, map: np.ndarray, norm: Normalize, incident: np.ndarray, col
 def lines(axes: Axes, map: np.ndarray, norm: Normalize) -> None:
     """Draw isolines, with their values."""
     low, high = norm.vmin, norm.vmax
-    locator = LogLocator(10, (1.0, 2.0, 5.0)) if isinstance(norm, LogNorm) else MaxNLocator(6)
+    if isinstance(norm, LogNorm):
+        locator: Locator = LogLocator(10, (1.0, 3.0) if high / low > MANY else (1.0, 2.0, 5.0))
+    else:
+        locator = MaxNLocator(6)
     levels = [level for level in locator.tick_values(low, high) if low < level < high]
     place = (np.arange(SIZE) + 0.5) / SIZE * 2 - 1
     drawn = axes.contour(place, place, map, levels=levels, colors="white", linewidths=0.5)

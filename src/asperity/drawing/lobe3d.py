@@ -11,6 +11,7 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
 from asperity.goniophotometer.sensors import check_angles, directions
+from asperity.materials import Material
 
 from . import style, values
 from .lobes import Radius
@@ -22,7 +23,7 @@ VIEW = (22, 110)
 
 
 def figure(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     *,
     theta: Sequence[float] | None = None,
     phi: float = 0.0,

@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from asperity.materials import Material
+
 from . import curves, style, values
 from .values import Curve
 
@@ -18,7 +20,7 @@ RAYS = (-90, -60, -30, 0, 30, 60, 90)
 
 
 def figure(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     *,
     theta: Sequence[float] | None = None,
     phi: float = 0.0,

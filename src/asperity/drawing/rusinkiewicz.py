@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from asperity.errors import ParameterError
+from asperity.materials import Material
 
 from . import style, values
 
@@ -22,7 +23,7 @@ HORIZON = 1e-2
 
 
 def figure(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     *,
     phi: float = 0.0,
     phi_d: float = 90.0,
@@ -49,7 +50,7 @@ def figure(
 
 
 def over_angles(
-    material: Any, phi_h: float = 0.0, phi_d: float = 90.0, wavelengths: Sequence[float] | None = None
+    material: Material, phi_h: float = 0.0, phi_d: float = 90.0, wavelengths: Sequence[float] | None = None
 ) -> np.ndarray:
     """f (channels, SIZE, SIZE), rows of equal θ_d, at azimuths of half vector and difference; NaN below the surface."""
     angles = (np.arange(SIZE) + 0.5) / SIZE * 90

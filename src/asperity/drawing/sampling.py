@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.colors import Normalize
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 from asperity.errors import ParameterError
 from asperity.goniophotometer.sensors import check_angles
 from asperity.lab.checks import density
+from asperity.materials import Material
 
 from . import style, values
 from .hemisphere import SIZE, bar, cells, disc, label, name_marks, pixels
@@ -23,7 +23,7 @@ CELL = 4 * np.pi / (density.ROWS * density.COLUMNS)
 
 
 def figure(
-    materials: Sequence[Any], *, theta: Sequence[float] | None = None, phi: float = 0.0, scale: str = "log"
+    materials: Sequence[Material], *, theta: Sequence[float] | None = None, phi: float = 0.0, scale: str = "log"
 ) -> Figure:
     """Histogram of `sample` beside `pdf`, and their difference in standard deviations, a row a material."""
     style.check_scale(scale)
@@ -49,7 +49,7 @@ def figure(
     return made
 
 
-def densities(material: Any, incident: tuple[float, float]) -> np.ndarray:
+def densities(material: Material, incident: tuple[float, float]) -> np.ndarray:
     """Density of a million samples and of the pdf in 1/sr, and their difference: (3, SIZE, SIZE), NaN off the disc.
 
     Over cells of the upper hemisphere; the difference is in standard deviations of the count.

@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from asperity.materials import Material
+
 from . import curves, style, values
 
 STEEP = 20
@@ -16,7 +18,7 @@ STEEP = 20
 
 
 def figure(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     *,
     theta: Sequence[float] | None = None,
     phi: float = 0.0,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 from asperity.errors import ParameterError
 from asperity.goniophotometer.sensors import check_angles, directions
 from asperity.lab import evaluate
+from asperity.materials import Material
 
 from . import curves, style, values
 from .values import Curve
@@ -21,7 +21,7 @@ STEP = 5.0
 
 
 def figure(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     *,
     theta: Sequence[float] | None = None,
     phi: float = 0.0,

@@ -16,6 +16,7 @@ from asperity.goniophotometer.plots import sectors
 from asperity.goniophotometer.sensors import check_angles, directions
 from asperity.goniophotometer.tracer import UNIT
 from asperity.lab import evaluate
+from asperity.materials import Material
 
 ANGLES = (0.0, 30.0, 60.0)
 """Of incidence, in degrees, if none are asked for."""
@@ -37,7 +38,7 @@ class Curve(NamedTuple):
     error: np.ndarray | None = None
 
 
-def channels(materials: Sequence[Any], wavelengths: Sequence[float] | None = None) -> list[str]:
+def channels(materials: Sequence[Material], wavelengths: Sequence[float] | None = None) -> list[str]:
     """Names of the channels in which all of these are drawn; raises ParameterError if they have different ones.
 
     Those of the measurements among them, or else of the variant in use, at ``wavelengths`` in nm if that is spectral.
@@ -102,7 +103,7 @@ def one(values: np.ndarray, index: int | None) -> np.ndarray:
     return values.mean(axis=0) if index is None else values[index]
 
 
-def at(material: Any, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = None) -> np.ndarray:
+def at(material: Material, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = None) -> np.ndarray:
     """f |cos θo| in 1/sr (channels, ...) for directions (..., 3), which are broadcast; raises ParameterError for NaN.
 
     In spectral variants at ``wavelengths``, any number of them, all in the same call.
@@ -128,13 +129,13 @@ def at(material: Any, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = None) -
     return values.reshape(-1, *shape)
 
 
-def transmits(material: Any) -> bool:
+def transmits(material: Material) -> bool:
     """Whether light goes through the surface."""
     return material.measured is None and bool(mi.has_flag(material.load().flags(), mi.BSDFFlags.Transmission))
 
 
 def incidence(
-    materials: Sequence[Any],
+    materials: Sequence[Material],
     theta: Sequence[float] | None,
     phi: float,
     default: Sequence[float] = ANGLES,
@@ -157,21 +158,27 @@ def incidence(
     check_angles([(0, phi)])
     if not measured:
         return np.array([(angle, phi) for angle in default], dtype=float)
-    common = set.intersection(*(set(_angles(material.measured, phi)) for material in measured))
+    common = set.intersection(*(set(_angles(measurement(material), phi)) for material in measured))
     if not common:
-        had = "; ".join(f"{material.name}: {_named(material.measured)}" for material in measured)
+        had = "; ".join(f"{material.name}: {_named(measurement(material))}" for material in measured)
         raise ParameterError(f"φ_i = {phi:g}°: no direction of incidence that all measurements have. Measured: {had}.")
     angles = sorted(common)
     chosen = np.unique(np.linspace(0, len(angles) - 1, min(len(angles), most)).round().astype(int))
     return np.array([(angles[n], phi) for n in chosen])
 
 
-def row(material: Any, incident: tuple[float, float]) -> int:
+def measurement(material: Material) -> Measurement:
+    """What was measured of a material that is a measurement."""
+    assert material.measured is not None
+    return material.measured
+
+
+def row(material: Material, incident: tuple[float, float]) -> int:
     """Which direction of incidence of a measurement this is; raises ParameterError if it is none."""
     theta, phi = incident
-    near = np.linalg.norm(material.measured.wi - directions([incident]), axis=1)
+    near = np.linalg.norm(measurement(material).wi - directions([incident]), axis=1)
     if near.min() > 1e-6:
-        had = _named(material.measured)
+        had = _named(measurement(material))
         raise ParameterError(f"{material.name}: not measured at θ_i = {theta:g}°, φ_i = {phi:g}°, but at {had}.")
     return int(near.argmin())
 
@@ -190,7 +197,7 @@ def _named(measured: Measurement) -> str:
 
 
 def in_plane(
-    material: Any, incident: np.ndarray, cosine: bool = True, wavelengths: Sequence[float] | None = None
+    material: Material, incident: np.ndarray, cosine: bool = True, wavelengths: Sequence[float] | None = None
 ) -> list[Curve]:
     """f |cos θo|, or f, over the plane of incidence: a curve for each direction of incidence (n, 2).
 
@@ -220,7 +227,7 @@ def in_azimuth(x: np.ndarray, phi: np.ndarray | float) -> np.ndarray:
 def _points(theta: float, below: bool, cosine: bool) -> np.ndarray:
     """Signed θo of a curve, denser near the light and the mirrored direction; their number is always the same."""
     end = 180.0 if below else 90.0
-    even = np.arange(-end, end + STEP / 2, STEP)
+    even = np.linspace(-end, end, round(2 * end / STEP) + 1)
     fine = np.arange(-NEAR, NEAR + FINE / 2, FINE)
     x = np.sort(np.concatenate([even, theta + fine, -theta + fine]))
     x = np.clip(x, -end, end)
@@ -228,9 +235,9 @@ def _points(theta: float, below: bool, cosine: bool) -> np.ndarray:
     return x if cosine else np.where(horizontal, np.sign(x) * HORIZON, x)
 
 
-def _measured_in_plane(material: Any, incident: np.ndarray) -> Curve:
+def _measured_in_plane(material: Material, incident: np.ndarray) -> Curve:
     """What a sensor has measured in the plane of incidence."""
-    measured, k = material.measured, row(material, tuple(incident))
+    measured, k = measurement(material), row(material, tuple(incident))
     cells, weights, x = _cells_in_plane(material, incident[1], k)
     energy = measured.energy[:, k].sum(axis=1)[:, cells]  # (tiles, bins, n, channels)
     value, error = estimate((energy * weights[..., None]).sum(axis=2) * UNIT, measured.paths[:, k])
@@ -239,16 +246,16 @@ def _measured_in_plane(material: Any, incident: np.ndarray) -> Curve:
     return Curve(x[order], value[order].T * scale, error[order].T * scale)
 
 
-def _cells_in_plane(material: Any, phi: float, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _cells_in_plane(material: Material, phi: float, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cells (bins, n) of a sensor that lie in the plane, their weights, and signed θo of the bins."""
-    sensor = material.measured.sensor
+    sensor = measurement(material).sensor
     if isinstance(sensor, Hemisphere):
         centres = np.degrees(np.arccos(1 - (np.arange(sensor.rows) + 0.5) / sensor.rows))
         back, forth = sectors(sensor, phi), sectors(sensor, phi + 180)
         weights = np.repeat([back[1], forth[1]], sensor.rows, axis=0)
         return np.concatenate([back[0], forth[0]]), weights, np.concatenate([-centres, centres])
     cells: np.ndarray
-    centre = sensor.directions(material.measured.wi[k])[:, 0]
+    centre = sensor.directions(measurement(material).wi[k])[:, 0]
     toward = np.array([np.cos(np.radians(phi)), np.sin(np.radians(phi))])
     if isinstance(sensor, Window):
         cells = np.arange(sensor.n)[:, None] * sensor.n + [(sensor.n - 1) // 2, sensor.n // 2]

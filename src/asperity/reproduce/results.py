@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
@@ -61,14 +61,12 @@ class Paper(NamedTuple):
 def findings(result: Result, kept: Kept) -> list[Finding]:
     """Those of a section that tell about a figure, in their order; raises LookupError if one is asked for in vain."""
     named = {finding.claim: finding for finding in kept.section.findings}
-    return [named[claim] for claim in matching(result, named, result.findings)]
+    return [named[claim] for claim in matching(result, list(named), result.findings)]
 
 
 def pictures(result: Result, kept: Kept) -> list[str]:
     """The names of a section's pictures that show a figure."""
-    if not kept.pictures and result.pictures == ("*",):
-        return []
-    return matching(result, dict.fromkeys(kept.pictures), result.pictures)
+    return matching(result, kept.pictures, result.pictures)
 
 
 def tables(result: Result, kept: Kept) -> Sequence[Table]:
@@ -76,9 +74,9 @@ def tables(result: Result, kept: Kept) -> Sequence[Table]:
     return kept.section.tables[result.tables]
 
 
-def matching(result: Result, names: Mapping[str, object], patterns: Sequence[str]) -> list[str]:
-    """Names that fit a pattern; raises LookupError if a pattern fits none, for then the page would claim nothing."""
+def matching(result: Result, names: Sequence[str], patterns: Sequence[str]) -> list[str]:
+    """Names that fit a pattern; raises LookupError if one fits none, unless all are asked for, of none."""
     for pattern in patterns:
-        if not any(fnmatchcase(name, pattern) for name in names):
+        if pattern != "*" and not any(fnmatchcase(name, pattern) for name in names):
             raise LookupError(f"{result.label}: {result.section!r} has nothing like {pattern!r}, but {list(names)}")
     return [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]

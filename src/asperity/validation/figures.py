@@ -20,9 +20,9 @@ def axes(x: str, y: str, title: str) -> tuple[Figure, Axes]:
     return figure, found
 
 
-def panels(rows: int, columns: int, x: str, y: str, title: str) -> tuple[Figure, np.ndarray]:
-    """Empty diagrams (rows, columns)."""
-    figure = _figure(3.1 * columns, 2.2 * rows + 0.6)
+def panels(rows: int, columns: int, x: str, y: str, title: str, width: float = 3.1) -> tuple[Figure, np.ndarray]:
+    """Empty diagrams (rows, columns), each so many inches wide."""
+    figure = _figure(width * columns, 2.2 * rows + 0.6)
     figure.suptitle(title)
     figure.supxlabel(x, fontsize=9)
     figure.supylabel(y, fontsize=9)

@@ -34,7 +34,7 @@ TURNED = (20.0, 40.0), (50.0, 250.0), (75.0, 10.0)
 ALBEDOS = 0.2, 0.6, 1.0
 """Of the body, in the three channels."""
 ENOUGH = 4e6
-"""Paths per direction, at least, where bounces are counted apart: by half of them noise alone may be an error of 1 %."""
+"""Paths per direction, at least, where bounces are counted apart: half of them have errors of up to 1 % by noise."""
 FIG_7 = {
     0.05: (0.9982, 0.9995),
     0.1: (0.9947, 0.9991),

@@ -7,7 +7,7 @@ Terms are numbered by the bounces k and by the side tau, +1 if the facet met fir
     f cos_o = sum D(pi/2 - b) g J prod F / (4 cos_i cos delta),   b = (pi/2 - tau P) / k,
     g = max(0, min(sin(b + tau P - Q), 2 cos P sin(b - Q))),   J = cos b / (k sin theta), or 1 if k = 1,
 
-where b is half the groove's aperture, theta_v / 2: derived in docs/papers/vgroove.md. `terms.by_terms` adds up just these.
+where b is half the groove's aperture, theta_v / 2: derived in docs/papers/vgroove.md. `terms.by_terms` adds just these.
 
 Here the terms of k <= `WRITTEN` are written out. All even k that are left, or all odd ones, are close to an integral
 over k / 2. With b for the variable, dk / k = -db / b, it no longer contains k. In one groove both sides together have a
