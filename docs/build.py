@@ -83,7 +83,8 @@ SWEEPS: dict[str, tuple[tuple[dict, str, tuple[float, ...]], ...]] = {
     ),
 }
 """What a parameter does: a material, the parameter, and its values."""
-STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", "dirty-weave")
+STRIP = ("dusty-wood", "verdigris", "gilded", "moldy-glass", "red-flock")
+STRIP += ("worn-copper", "polished-gold", "hematite", "corrugated-plastic", "lacquer-by-normal")
 
 
 def table(model) -> str:
@@ -166,21 +167,40 @@ def kept_table() -> str:
     return "\n".join(lines)
 
 
-def strip(path: Path, size: int = 256, spp: int = 256) -> None:
-    """Six presets side by side."""
+def shot(name: str, size: int, spp: int):
+    """A preset's preview, denoised, at twice the size and then halved: `PIL.Image`."""
     import mitsuba as mi
     import numpy as np
+    from PIL import Image
 
-    from asperity.scenes import presets
+    from asperity.scenes import denoise, presets
     from asperity.scenes.preview import preview
 
     mi.set_variant("llvm_ad_rgb")
-    images = []
-    for name in STRIP:
-        preset = presets.load(name)
-        scene = preview(preset.material, **preset.preview, size=(size, size), spp=spp)
-        images.append(np.asarray(mi.render(mi.load_dict(scene, parallel=False))))
-    mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)[..., :3]), write_async=False)
+    preset = presets.load(name)
+    scene = mi.load_dict(preview(preset.material, **preset.preview, size=(2 * size, 2 * size)), parallel=False)
+    image = denoise.denoised(np.array(mi.render(scene, spp=spp)), *denoise.features(scene))
+    bitmap = mi.Bitmap(image).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, srgb_gamma=True)
+    return Image.fromarray(np.array(bitmap)).resize((size, size), Image.Resampling.BOX)
+
+
+def strip(path: Path, size: int = 240, columns: int = 5, spp: int = 64) -> None:
+    """The presets of STRIP in rows."""
+    from PIL import Image
+
+    whole = Image.new("RGB", (columns * size, -(-len(STRIP) // columns) * size))
+    for n, name in enumerate(STRIP):
+        whole.paste(shot(name, size, spp), (n % columns * size, n // columns * size))
+    whole.save(path, optimize=True)
+
+
+def gallery(folder: Path, size: int = 256, spp: int = 16) -> None:
+    """A thumbnail of each preset, for the site."""
+    from asperity.scenes import presets
+
+    folder.mkdir(exist_ok=True)
+    for name in presets.names():
+        shot(name, size, spp).save(folder / f"{name}.jpg", quality=88)
 
 
 def sweeps(name: str) -> str:
@@ -304,6 +324,7 @@ def main() -> None:
     page.write_text(between(page.read_text(), BEGIN_KEPT, kept_table(), END_KEPT))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
+        gallery(DOCS / "pictures" / "gallery")
         figures(DOCS / "pictures")
         plots(DOCS / "pictures")
         draw_sweeps(DOCS / "pictures" / "sweeps")
