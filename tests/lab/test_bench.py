@@ -1,8 +1,10 @@
 """`lab.bench`: what is measured, in small."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from asperity.errors import ParameterError
 from asperity.lab import bench
 from asperity.lab.bench import first, timing
 
@@ -17,6 +19,12 @@ def test_tasks_take_turns():
     seconds, results = timing.turns(tasks, 3)
     assert "".join(called) == "ab" + "ba" + "ab" + "ba"
     assert [len(times) for times in seconds.values()] == [3, 3] and results == {"a": [4, 5, 8], "b": [3, 6, 7]}
+
+
+def test_no_times_without_arrays():
+    mi.set_variant("scalar_rgb")
+    with pytest.raises(ParameterError, match=r"variant scalar_rgb: timing needs .* llvm_ad_rgb"):
+        bench.measure({"metal": METAL}, TINY)
 
 
 def test_quartiles_of_what_is_known():
