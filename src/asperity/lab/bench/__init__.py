@@ -39,7 +39,7 @@ class Effort(NamedTuple):
     fresh: int
 
 
-FULL, QUICK = Effort(160, 16, 7, 1 << 21, 2), Effort(96, 8, 3, 1 << 19, 1)
+FULL, QUICK = Effort(160, 16, 5, 1 << 21, 2), Effort(96, 8, 3, 1 << 19, 1)
 
 
 def measure(
