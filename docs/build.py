@@ -18,6 +18,7 @@ from textwrap import fill
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- parameters: made by docs/build.py -->", "<!-- end of parameters -->"
 BEGIN_SPEED, END_SPEED = "<!-- speed: made by docs/build.py -->", "<!-- end of speed -->"
+BEGIN_COSTS, END_COSTS = "<!-- costs: made by docs/build.py -->", "<!-- end of costs -->"
 BEGIN_KEPT, END_KEPT = "<!-- kept: made by docs/build.py -->", "<!-- end of kept -->"
 SPEED = DOCS / "speed.json"
 CALLS, FRAMES = ("eval_pdf", "sample"), ("bare", "preview", "filled")
@@ -83,7 +84,8 @@ SWEEPS: dict[str, tuple[tuple[dict, str, tuple[float, ...]], ...]] = {
     ),
 }
 """What a parameter does: a material, the parameter, and its values."""
-STRIP = ("dusty-wood", "verdigris", "gilded", "rusty-aluminium", "moldy-glass", "dirty-weave")
+STRIP = ("dusty-wood", "verdigris", "gilded", "moldy-glass", "red-flock")
+STRIP += ("worn-copper", "polished-gold", "hematite", "corrugated-plastic", "lacquer-by-normal")
 
 
 def table(model) -> str:
@@ -140,6 +142,25 @@ def with_speed(page: str, name: str, report: dict) -> str:
     return between(page, BEGIN_SPEED, speed_table(name, report), END_SPEED) if BEGIN_SPEED in page else page
 
 
+def costs_table(report: dict) -> str:
+    """The least and the most that each model's frames take beside Mitsuba's, in Markdown."""
+    lines = ["| | beside | " + " | ".join(f"frame, *{scene}*" for scene in FRAMES) + " |", "|" + "---|" * 5]
+    timed = {row: found for row, found in report["rows"].items() if row != found["against"]}
+    for name in dict.fromkeys(row.split(",")[0] for row in timed):
+        rows = [found for row, found in timed.items() if row.split(",")[0] == name]
+        ranges = []
+        for scene in FRAMES:
+            ratios = sorted(found[scene]["ratio"][1] for found in rows)
+            ranges.append(" to ".join(dict.fromkeys(f"{ratio:.2f}" for ratio in (ratios[0], ratios[-1]))))
+        lines.append(f"| [`{name}`]({name}.md) | {rows[0]['against']} | " + " | ".join(ranges) + " |")
+    return "\n".join(lines)
+
+
+def with_costs(page: str, report: dict) -> str:
+    """The page with what models cost between the marks."""
+    return between(page, BEGIN_COSTS, costs_table(report), END_COSTS)
+
+
 def kept() -> list[list[float]]:
     """Albedos of the white materials, by angle of incidence and roughness."""
     import mitsuba as mi
@@ -166,21 +187,40 @@ def kept_table() -> str:
     return "\n".join(lines)
 
 
-def strip(path: Path, size: int = 256, spp: int = 256) -> None:
-    """Six presets side by side."""
+def shot(name: str, size: int, spp: int):
+    """A preset's preview, denoised, at twice the size and then halved: `PIL.Image`."""
     import mitsuba as mi
     import numpy as np
+    from PIL import Image
 
-    from asperity.scenes import presets
+    from asperity.scenes import denoise, presets
     from asperity.scenes.preview import preview
 
     mi.set_variant("llvm_ad_rgb")
-    images = []
-    for name in STRIP:
-        preset = presets.load(name)
-        scene = preview(preset.material, **preset.preview, size=(size, size), spp=spp)
-        images.append(np.asarray(mi.render(mi.load_dict(scene, parallel=False))))
-    mi.util.write_bitmap(str(path), mi.TensorXf(np.concatenate(images, axis=1)[..., :3]), write_async=False)
+    preset = presets.load(name)
+    scene = mi.load_dict(preview(preset.material, **preset.preview, size=(2 * size, 2 * size)), parallel=False)
+    image = denoise.denoised(np.array(mi.render(scene, spp=spp)), *denoise.features(scene))
+    bitmap = mi.Bitmap(image).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, srgb_gamma=True)
+    return Image.fromarray(np.array(bitmap)).resize((size, size), Image.Resampling.BOX)
+
+
+def strip(path: Path, size: int = 240, columns: int = 5, spp: int = 64) -> None:
+    """The presets of STRIP in rows."""
+    from PIL import Image
+
+    whole = Image.new("RGB", (columns * size, -(-len(STRIP) // columns) * size))
+    for n, name in enumerate(STRIP):
+        whole.paste(shot(name, size, spp), (n % columns * size, n // columns * size))
+    whole.save(path, optimize=True)
+
+
+def gallery(folder: Path, size: int = 256, spp: int = 16) -> None:
+    """A thumbnail of each preset, for the site."""
+    from asperity.scenes import presets
+
+    folder.mkdir(exist_ok=True)
+    for name in presets.names():
+        shot(name, size, spp).save(folder / f"{name}.jpg", quality=88)
 
 
 def sweeps(name: str) -> str:
@@ -301,9 +341,10 @@ def main() -> None:
         page = DOCS / f"{name}.md"
         page.write_text(with_sweeps(with_speed(with_table(page.read_text(), model), name, report), name))
     page = DOCS / "which.md"
-    page.write_text(between(page.read_text(), BEGIN_KEPT, kept_table(), END_KEPT))
+    page.write_text(between(with_costs(page.read_text(), report), BEGIN_KEPT, kept_table(), END_KEPT))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
+        gallery(DOCS / "pictures" / "gallery")
         figures(DOCS / "pictures")
         plots(DOCS / "pictures")
         draw_sweeps(DOCS / "pictures" / "sweeps")

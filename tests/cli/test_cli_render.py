@@ -1,5 +1,6 @@
 import json
 import signal
+from importlib.util import find_spec
 
 import mitsuba as mi
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from asperity.cli.passes import pass_size
 from asperity.cli.render import NEXT
+from asperity.scenes import denoise, presets
 
 TINY = ("--size", "32", "--spp", "4")
 SCENE = {
@@ -180,3 +182,79 @@ def test_ctrl_c_keeps_the_picture(asperity, tmp_path, monkeypatch):
 def test_a_material_by_its_name_or_text(asperity, tmp_path, material):
     result = asperity("render", material, "--set", "reflectance=0.2", *TINY, "-o", "out.png")
     assert result.exit_code == 0 and (tmp_path / "out.png").is_file(), result.output
+
+
+def test_a_turntable_is_a_folder_of_frames(asperity, tmp_path):
+    result = asperity("render", "--preset", "gilded", "--object", "knot", "--turntable", "3", *TINY)
+    assert result.exit_code == 0, result.output
+    assert files(tmp_path / "turntable") == ["1.png", "2.png", "3.png"]
+    one, two = (pixels(f"turntable/{n}.png").astype(float) for n in (1, 2))
+    assert np.abs(one - two).mean() > 2
+    assert "not empty" in asperity("render", "--turntable", "2", "-o", "turntable", *TINY).output
+
+
+@pytest.fixture
+def three_presets(monkeypatch):
+    monkeypatch.setattr(presets, "names", lambda: ["chalk", "gilded", "soot"])
+
+
+def test_all_on_a_contact_sheet_goes_on_where_it_stopped(asperity, tmp_path, monkeypatch, three_presets):
+    render, count = mi.render, []
+
+    def interrupted(*arguments, **options):
+        count.append(1)
+        if len(count) == 2:
+            signal.raise_signal(signal.SIGINT)
+        return render(*arguments, **options)
+
+    monkeypatch.setattr(mi, "render", interrupted)
+    command = ("render", "--all", "--contact-sheet", "--size", "16", "--spp", "4")
+    result = asperity(*command)
+    assert result.exit_code == 0 and "stopped early: 2 of 3 pictures" in result.output, result.output
+    assert files(tmp_path / "presets") == ["chalk.png", "gilded.png"]
+    before = (tmp_path / "presets" / "chalk.png").stat().st_mtime_ns
+    assert "presets/contact-sheet.png: 3 pictures" in asperity(*command).output
+    assert files(tmp_path / "presets") == ["chalk.png", "contact-sheet.png", "gilded.png", "soot.png"]
+    assert (tmp_path / "presets" / "chalk.png").stat().st_mtime_ns == before
+    asperity(*command, "--force")
+    assert (tmp_path / "presets" / "chalk.png").stat().st_mtime_ns > before
+
+
+@pytest.mark.skipif(find_spec("pyoidn") is None, reason="an extra: pyoidn")
+def test_denoising_changes_the_png_and_only_adds_to_the_exr(asperity):
+    for name, more in {"default": (), "on": ("--denoise",), "off": ("--no-denoise",)}.items():
+        assert asperity("render", "--preset", "gilded", *TINY, *more, "-o", name).exit_code == 0
+    raw, default, layered = (pixels(f"{name}.exr") for name in ("off", "default", "on"))
+    assert np.allclose(raw, default, rtol=1e-5) and np.allclose(raw, layered[..., :3], rtol=1e-5)
+    assert {field.name for field in mi.Bitmap("on.exr").struct_()} >= {"R", "denoised.R", "denoised.B"}
+    assert (pixels("default.png") == pixels("on.png")).mean() > 0.99  # the film sums in any order
+    assert (pixels("default.png") != pixels("off.png")).mean() > 0.3
+
+
+def test_a_missing_denoiser_is_an_error_only_if_asked_for(asperity, tmp_path, monkeypatch):
+    monkeypatch.setattr(denoise, "find_spec", lambda name: None)
+    assert asperity("render", *TINY, "-o", "a.png").exit_code == 0
+    result = asperity("render", *TINY, "--denoise", "-o", "b.png")
+    assert result.exit_code == 2 and "there is no pyoidn; python -m pip install" in result.output
+    assert files(tmp_path) == ["a.png"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--light", "frnt"), "unknown light 'frnt'. Did you mean 'front'?"),
+        (("--floor", "tile"), "unknown floor 'tile'. Did you mean 'tiles'?"),
+        (("--turntable", "0"), "greater than or equal to 1"),
+        (("--turntable", "2", "--compare", "gilded"), "--compare: not with --turntable"),
+        (("--all", "--preset", "gilded", "--set", "a=1"), "--preset, --set: not with --all"),
+        (("--contact-sheet",), "--contact-sheet: it is for --all"),
+        (("--all", "-o", "file"), "-o file: it is a file, not a folder"),
+        (("--turntable", "2", "-o", "no/where"), "cannot write into the folder 'no'"),
+        (("scene.json", "--light", "key"), "--light: a scene file has its own"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(asperity, tmp_path, arguments, words):
+    (tmp_path / "file").touch()
+    result = asperity("render", *arguments, *TINY)
+    assert result.exit_code != 0 and words in " ".join(result.output.split()), result.output
+    assert files(tmp_path) == ["file"]

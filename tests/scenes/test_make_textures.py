@@ -8,7 +8,9 @@ from asperity.scenes import make_textures
 
 @pytest.mark.usefixtures("rgb")
 def test_textures_are_those_the_script_makes():
-    textures = {"wood": make_textures.wood(), **make_textures.weave(), "patina": make_textures.patina()}
+    textures = {"wood": make_textures.wood(), **make_textures.weave(), "patina": make_textures.patina()} | {
+        "lint": make_textures.lint()
+    }
     for name, image in textures.items():
         path = make_textures.TEXTURES / f"{name}.png"
         assert path.stat().st_size < 150_000

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 from geometry import area_vectors, corners, tangents, uv_areas
+from scipy.spatial.transform import Rotation
 
-from asperity.scenes.objects import OBJECTS, ball, knot, pawn, sphere
+from asperity.scenes.objects import BALL_POSE, BALL_RADIUS, OBJECTS, ball, knot, pawn, sphere
 
 
 @pytest.fixture(params=OBJECTS)
@@ -56,3 +57,27 @@ def test_the_pawn_has_parts_that_catch_dust_and_parts_that_hide_from_it():
     assert mesh.normals[foot, 2].max() > 0.9
     assert mesh.normals[collar, 2].max() > 0.95
     assert mesh.normals[collar, 2].min() < -0.9
+
+
+def test_the_ball_has_flat_hollow_and_round_parts_and_a_chipped_edge():
+    mesh = ball()
+    face = Rotation.from_matrix(BALL_POSE).apply([0, 0, 1])
+    flat = np.einsum("vi,i->v", mesh.normals, face) > 0.99999
+    height = mesh.vertices[flat] @ face
+    assert flat.sum() > 10_000 and np.quantile(height, 0.9) - np.quantile(height, 0.1) < 1e-3, "the flat ring"
+    upper = mesh.vertices[:, 2] > 0.6
+    centre = np.array([0, 0, mesh.vertices[upper, 2].max() - BALL_RADIUS])
+    outward = np.einsum("vi,vi->v", mesh.normals, mesh.vertices - centre)
+    assert (outward[upper] < -0.1).mean() > 0.02, "the bowl faces its own middle"
+    rim = np.abs(mesh.vertices[:, 2] - 0.24) < 0.004
+    radius = np.hypot(*mesh.vertices[rim, :2].T)
+    assert radius.max() == pytest.approx(1.0, abs=0.01) and radius.min() < 0.985, "chips"
+
+
+def test_u_of_the_plinth_follows_its_turning():
+    mesh = ball()
+    below = mesh.vertices[mesh.faces][..., 2].max(axis=1) < 0.17  # below the chips
+    a, b, c = corners(mesh)
+    x, y, _ = ((a + b + c) / 3)[below].T
+    around = np.stack([-y, x, np.zeros_like(x)], axis=1) / np.hypot(x, y)[:, None]
+    assert np.einsum("fi,fi->f", tangents(mesh)[below], around).min() > 0.9999

@@ -5,7 +5,7 @@ import pytest
 
 from asperity.errors import ParameterError, UnknownNameError, UnreadableFileError
 from asperity.scenes.objects import OBJECTS
-from asperity.scenes.preview import ENVIRONMENTS, WHITE, irradiance, lit_by, preview
+from asperity.scenes.preview import ENVIRONMENTS, LIGHTS, ROOM, WHITE, irradiance, lit_by, preview
 
 GREY = {"type": "twosided", "bsdf": {"type": "diffuse"}}
 GLASS = {"type": "roughdielectric", "alpha": 0.1}
@@ -80,6 +80,8 @@ def test_a_map_from_a_file_keeps_its_colour(variant, tmp_path):
         ({"object": "pwan"}, ["object", "'pwan'", "Did you mean 'pawn'", "knot", "sphere", "FILE.ply"]),
         ({"object": 3}, ["object", "'3'", "FILE.ply"]),
         ({"env": 3}, ["environment", "'3'", "FILE.exr"]),
+        ({"light": "frnt"}, ["light", "'frnt'", "Did you mean 'front'", "key", "rim"]),
+        ({"floor": "tile"}, ["floor", "'tile'", "Did you mean 'tiles'", "paper"]),
         ({"env": "venise"}, ["environment", "'venise'", "Did you mean 'venice'", "constant", "FILE.exr"]),
     ],
 )
@@ -112,3 +114,43 @@ def test_a_map_without_light_is_refused(variant, tmp_path, pixel):
 def test_a_crease_is_for_mesh_files(variant):
     with pytest.raises(ParameterError, match="crease = 30: the pawn has normals of its own"):
         preview(GREY, crease=30)
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+def test_light_comes_from_where_it_says(variant, light):
+    """White paper that faces a lamp gets its light, and that of the dim room."""
+    for place in LIGHTS[light]:
+        scene = preview(GREY, env="constant", light=light, size=(8, 8), spp=64)
+        scene["ground"] = {"type": "sphere", "radius": 1e-3, "center": [0, 0, -9]}
+        paper = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 1.0}}
+        facing = mi.ScalarTransform4f().look_at([0, 0, 1], [*np.add(place, [0, 0, 1])], [0, 0, 1])
+        scene["object"] = {"type": "rectangle", "to_world": facing, "bsdf": paper}
+        scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at(
+            [*(np.add(place, [0, 0, 1]))], [0, 0, 1], [0, 0, 1]
+        )
+        scene["sensor"]["fov"] = 20
+        picture = render(scene, seed=1)[2:6, 2:6].mean()
+        # The lamp is a disc of 6 degrees at a distance of 40, seen from 1 beside its own origin: 3%. A second
+        # lamp, where there are two, adds the cosine of the angle between them, if that is positive.
+        others = [np.dot(place, other) / np.linalg.norm(place) / np.linalg.norm(other) for other in LIGHTS[light]]
+        assert picture == pytest.approx(WHITE * (ROOM + sum(max(cosine, 0) for cosine in others)), rel=0.05)
+
+
+def test_grains_send_light_back_and_lambert_does_not(variant):
+    """What the front light is for: the outline of a ball of dust is as bright as its middle."""
+    moon = {"type": "lambertsphere", "reflectance": 0.12}
+    rows = [render(preview(one, object="sphere", light="front", size=(64, 64), spp=64))[..., 1] for one in (moon, GREY)]
+    # Across the ball, whose radius is 22 of 64 pixels: its middle, and 19 pixels to the left.
+    limb = [picture[31:33, 12:14].mean() / picture[31:33, 30:34].mean() for picture in rows]
+    assert limb[0] > 0.9
+    # Lambert's cosine is .5 there; the ground adds to it, and so does the room.
+    assert 0.5 < limb[1] < 0.75
+
+
+def test_a_turn_goes_all_the_way_round(variant):
+    def picture(turn):
+        return render(preview(GREY, object="knot", env="constant", turn=turn, size=(32, 32), spp=16))
+
+    start, quarter, whole = (picture(turn) for turn in (0, 90, 360))
+    noise, change = np.abs(start - whole).mean(), np.abs(start - quarter).mean()
+    assert noise < 0.01 and change > 0.03

@@ -99,6 +99,12 @@ def wear() -> Image:
     return 0.05 + 0.95 * np.maximum(rough, 0.6 * scratches)
 
 
+def lint() -> Image:
+    """Filling factor of what lies loose: dust, flock, fibres; even from afar, and grainy at hand."""
+    loose = noise(41, 0.5, 60) + 0.4 * noise(42, 1.2, 6)
+    return np.round(16 * (0.2 + 0.7 * smoothstep(-1.6, 1.6, loose[::2, ::2]))) / 16  # half the size, for the file
+
+
 def encoded(image: Image) -> NDArray[np.uint8]:
     """8 bits: a colour in sRGB, a grey one, which is data, as it is."""
     if image.ndim == 3:
@@ -108,5 +114,5 @@ def encoded(image: Image) -> NDArray[np.uint8]:
 
 if __name__ == "__main__":
     mi.set_variant("scalar_rgb")
-    for name, image in {"wood": wood(), **weave(), "patina": patina(), "wear": wear()}.items():
+    for name, image in {"wood": wood(), **weave(), "patina": patina(), "wear": wear(), "lint": lint()}.items():
         mi.Bitmap(encoded(image)).write(str(TEXTURES / f"{name}.png"), quality=9)

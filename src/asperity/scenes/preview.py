@@ -38,7 +38,7 @@ LIGHTS: dict[str, list[tuple[float, float, float]]] = {
     "front": [(0, -0.97, 0.25)],
     "back": [(0.1, 0.9, 0.42)],
     "side": [(-1, -0.05, 0.25)],
-    "rim": [(-0.75, 0.6, 0.3), (0.75, 0.6, 0.3)],
+    "rim": [(-0.7, 0.7, 0.3), (0.7, 0.7, 0.3)],
 }
 """Where lamps are, seen from the object; the camera is in front, towards -y."""
 LAMP_DISTANCE, LAMP_RADIUS = 40.0, 4.0
@@ -142,17 +142,19 @@ def tiles(resolution: int = 1536) -> Map:
     joint = np.clip(np.minimum(joint, joint[:, None]) / 0.02, 0, 1)
     pattern = (0.32 + 0.36 * light) * (0.55 + 0.45 * joint) - 0.5
     seen = np.clip((9 - distance) / 5, 0, 1)
-    grey = (0.5 + pattern * seen**2 * (3 - 2 * seen)) * (0.35 + 0.65 / (1 + (distance / 6) ** 2))
-    return grey[..., None] * np.array([0.85, 0.82, 0.79])
+    grey = (0.5 + pattern * seen**2 * (3 - 2 * seen)) * (0.2 + 0.8 / (1 + (distance / 5) ** 2))
+    # Far away it is the room's walls that one sees on it: blue to the left, amber to the right.
+    side = np.clip(x / 4, -1, 1)[None, :, None] * (1 - seen)[..., None]
+    return 0.82 * grey[..., None] * (1 + side * np.array([0.35, 0, -0.35]))
 
 
 def lamps(light: str | None) -> dict[str, Description]:
-    """Round lamps; white paper that faces one has about the radiance WHITE."""
+    """Round lamps; each gives white paper that faces it about the radiance WHITE."""
     if light is None:
         return {}
     if light not in LIGHTS:
         raise UnknownNameError("light", str(light), [*LIGHTS])
-    radiance = WHITE * (1 + (LAMP_DISTANCE / LAMP_RADIUS) ** 2) / len(LIGHTS[light])
+    radiance = WHITE * (1 + (LAMP_DISTANCE / LAMP_RADIUS) ** 2)
     places = [np.array(place) * (LAMP_DISTANCE / np.linalg.norm(place)) for place in LIGHTS[light]]
     return {
         f"lamp_{n}": {
@@ -201,7 +203,7 @@ def atelier(height: int = 256) -> Map:
     azimuth = (np.arange(2 * height) + 0.5) / height * 180  # from the back, clockwise seen from above
     elevation = 90 - (np.arange(height)[:, None] + 0.5) / height * 180
     right = (0.5 + 0.5 * np.sin(np.radians(azimuth)))[None, :, None]
-    walls = np.array([0.02, 0.09, 0.2]) * (1 - right) + np.array([0.3, 0.11, 0.03]) * right
+    walls = np.array([0.01, 0.06, 0.15]) * (1 - right) + np.array([0.2, 0.07, 0.015]) * right
     radiance = walls * (0.3 + 0.7 * np.cos(np.radians(elevation)))[..., None]
     boxes = [
         # azimuth and elevation of the middle, half width and half height, in degrees; radiance
