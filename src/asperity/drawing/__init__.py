@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,8 @@ VIEWS: dict[str, Callable[..., Figure]] = {
 """Each takes materials and options by name, and gives a figure; the first line of its docstring says what it shows."""
 MEASURED = ("lobes", "slices", "hemisphere", "albedo", "comparison")
 """Views that draw what was measured itself; the others draw a BSDF that interpolates it."""
+MOST = 3
+"""Parameters in a name that tells materials apart."""
 ALL_LIGHT = ("albedo", "comparison")
 """Where mirrors are seen, too."""
 
@@ -111,9 +113,23 @@ def distinct_names(materials: Sequence[Material]) -> list[str]:
 
 
 def _differing(description: Any, others: Sequence[Any]) -> list[str]:
-    """The parameters of a description that others have not, or have otherwise."""
-    keys = [key for key, value in description.items() if any(one.get(key, ...) != value for one in others)]
-    return [f"{key} = {short(description[key])}" for key in keys]
+    """The parameters of a description that others have not, or have otherwise; the first few."""
+    leaves, *rest = (dict(_leaves(one)) for one in (description, *others))
+    found = [
+        f"{key} = {short(value)}" for key, value in leaves.items() if any(one.get(key, ...) != value for one in rest)
+    ]
+    return found if len(found) <= MOST else [*found[:MOST], "..."]
+
+
+def _leaves(description: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Parameters by their dotted names; a colour is its value."""
+    for key, value in description.items():
+        if isinstance(value, dict) and value.get("type") == "rgb":
+            yield path + key, value.get("value")
+        elif isinstance(value, dict):
+            yield from _leaves(value, f"{path}{key}.")
+        else:
+            yield path + key, value
 
 
 def _loaded(material: Material, view: str) -> Material:
