@@ -108,6 +108,10 @@ def test_names_that_are_the_same_get_what_differs(measured):
     one, two = ({"type": "micrograin", "tau_0": tau, "beta": 1} for tau in (0.2, 0.4))
     named = drawing.distinct_names([Material("rust", one), Material("dust", one), Material("rust", two)])
     assert named == ["rust, tau_0 = 0.2", "dust", "rust, tau_0 = 0.4"]
+    nested = [
+        Material("rust", {"type": "micrograin", "base": {"type": "diffuse", "reflectance": r}}) for r in (0.2, 0.5)
+    ]
+    assert drawing.distinct_names(nested) == ["rust, base.reflectance = 0.2", "rust, base.reflectance = 0.5"]
     assert drawing.distinct_names([measured, measured]) == ["measured (1)", "measured (2)"]
 
 

@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from ... import llvm, loading
+from .. import evaluate
 from .first import First, first_picture
 from .scenes import scenes
 from .timing import finish, quartiles, turns
@@ -53,7 +54,9 @@ def measure(
     picture in a new process, and ``memory`` the most that it took, in MiB (``value`` and ``ratio``).
 
     ``tick(column)`` is called after each task; what it raises ends it.
+    Raises ParameterError in variants without arrays.
     """
+    evaluate.require_arrays("timing")
     reference = next(iter(materials))
     rows: dict[str, Row] = {name: {"against": reference} for name in materials}
     for column, tasks in calls(materials, effort.lanes).items():
