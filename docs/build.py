@@ -187,8 +187,8 @@ def kept_table() -> str:
     return "\n".join(lines)
 
 
-def shot(name: str, size: int, spp: int):
-    """A preset's preview, denoised, at twice the size and then halved: `PIL.Image`."""
+def shot(name: str, size: int, spp: int, finer: int = 1):
+    """A preset's preview, denoised, perhaps rendered ``finer`` than it is: `PIL.Image`."""
     import mitsuba as mi
     import numpy as np
     from PIL import Image
@@ -198,7 +198,7 @@ def shot(name: str, size: int, spp: int):
 
     mi.set_variant("llvm_ad_rgb")
     preset = presets.load(name)
-    scene = mi.load_dict(preview(preset.material, **preset.preview, size=(2 * size, 2 * size)), parallel=False)
+    scene = mi.load_dict(preview(preset.material, **preset.preview, size=(finer * size,) * 2), parallel=False)
     image = denoise.denoised(np.array(mi.render(scene, spp=spp)), *denoise.features(scene))
     bitmap = mi.Bitmap(image).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, srgb_gamma=True)
     return Image.fromarray(np.array(bitmap)).resize((size, size), Image.Resampling.BOX)
@@ -210,7 +210,7 @@ def strip(path: Path, size: int = 240, columns: int = 5, spp: int = 64) -> None:
 
     whole = Image.new("RGB", (columns * size, -(-len(STRIP) // columns) * size))
     for n, name in enumerate(STRIP):
-        whole.paste(shot(name, size, spp), (n % columns * size, n // columns * size))
+        whole.paste(shot(name, size, spp, finer=2), (n % columns * size, n // columns * size))
     whole.save(path, optimize=True)
 
 

@@ -239,6 +239,8 @@ def changed(description: Description, settings: Iterable[str] | Mapping[str, Any
     """A description with other parameters. Whether they exist is for the plugin to say; raises ParameterError."""
     from . import loading
 
+    if not isinstance(settings, Iterable):
+        raise ParameterError(f"settings = {loading.short(settings)}: expected a mapping, or texts NAME=VALUE.")
     changes = settings.items() if isinstance(settings, Mapping) else map(_setting, settings)
     result = _copied(description)
     for path, new in changes:

@@ -112,10 +112,13 @@ def chosen(targets: list[str], settings: list[str], against: str | None, quick: 
 
 def described(target: str, settings: list[str]) -> tuple[str, dict[str, Any]]:
     """The name and the description of a material, which other processes can load too."""
+    from asperity.lab.bench import first
+
     material = resolve(target, settings)
     if material.description is None:
         raise ParameterError(f"{target}: only what has a description can be timed; a measurement has none.")
     material.load()  # complains in one line
+    first.told(material.description)
     return ", ".join([material.name, *settings]), material.description
 
 

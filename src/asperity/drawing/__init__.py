@@ -8,8 +8,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
+import numpy as np
 
-from asperity.errors import ParameterError, UnknownNameError, suggestion
+from asperity.errors import ParameterError, UnknownNameError, refuse_unknown
 from asperity.loading import short
 
 from . import albedo, comparison, hemisphere, lobe3d, lobes, rusinkiewicz, sampling, slices, spectrum, style
@@ -40,6 +41,9 @@ MOST = 3
 ALL_LIGHT = ("albedo", "comparison")
 """Where mirrors are seen, too."""
 
+NUMBERS = ("theta", "theta_o", "wavelengths")
+"""Options that are several numbers, or one."""
+
 
 def plot(materials: Sequence[Material], view: str = "lobes", **options: Any) -> Figure:
     """A Matplotlib figure of materials, together, in the variant of Mitsuba that is in use.
@@ -60,12 +64,24 @@ def plot(materials: Sequence[Material], view: str = "lobes", **options: Any) -> 
         raise UnknownNameError("view", view, VIEWS)
     if not materials:
         raise ParameterError("materials: expected at least one.")
-    known = option_names(view)
-    for name in options.keys() - set(known):
-        raise ParameterError(f"{name}: makes no sense with view {view}. {suggestion(name, known)}")
+    refuse_unknown(options, option_names(view), f"view {view}")
+    options = {name: _numbers(name, value) if name in NUMBERS else value for name, value in options.items()}
     named = [replace(one, name=name) for one, name in zip(materials, distinct_names(materials))]
     with style.applied():
         return VIEWS[view]([_loaded(material, view) for material in named], **options)
+
+
+def _numbers(name: str, given: Any) -> list[float] | None:
+    """Those of an option, as a list; raises ParameterError."""
+    if given is None:
+        return None
+    try:
+        found = np.atleast_1d(np.asarray(given, dtype=float))
+    except (TypeError, ValueError):
+        found = np.zeros((0, 0))
+    if found.ndim != 1 or not found.size:
+        raise ParameterError(f"{name} = {short(given)}: expected a number, or a list of numbers.")
+    return [float(number) for number in found]
 
 
 def compared(a: Material, b: Material, found: Comparison, previews: Previews | None = None) -> Figure:

@@ -62,12 +62,10 @@ def channels(materials: Sequence[Material], wavelengths: Sequence[float] | None 
 
 def _check_variant(wavelengths: Sequence[float] | None) -> None:
     """Raise ParameterError if no curve can be computed in the variant in use."""
-    variant = evaluate.active_variant()
-    if not dr.is_jit_v(mi.Float):
-        raise ParameterError(f"variant {variant}: pictures need one that computes on arrays, such as llvm_ad_rgb.")
+    evaluate.require_arrays("drawing")
     if wavelengths is not None and not mi.is_spectral:
         raise ParameterError(
-            f"wavelengths: variant {variant} has none. Choose a spectral one, such as llvm_ad_spectral."
+            f"wavelengths: variant {mi.variant()} has none. Choose a spectral one, such as llvm_ad_spectral."
         )
     for wavelength in wavelengths or ():
         if not mi.MI_CIE_MIN <= wavelength <= mi.MI_CIE_MAX:
