@@ -104,7 +104,8 @@ def resolve(what: Any, settings: Iterable[str] | Mapping[str, Any] = ()) -> Mate
     if not settings:
         return found
     if found.description is None:
-        raise ParameterError(f"{found.name}: settings change a description, and this is a {_kind(what)}.")
+        kind = "measurement" if found.measured is not None else "BSDF that is loaded already"
+        raise ParameterError(f"{found.name}: settings change a description, and this is a {kind}.")
     return replace(found, description=changed(found.description, settings))
 
 

@@ -132,7 +132,9 @@ def about() -> dict[str, Any]:
         except OSError:
             return ""
 
-    commit = git("rev-parse", "--short", "HEAD") or __version__
+    if not git("ls-files", Path(__file__).name):  # installed, perhaps within somebody's repository
+        return {"asperity": __version__, "commit": __version__}
+    commit = git("rev-parse", "--short", "HEAD")
     return {"asperity": __version__, "commit": commit + ("+" if git("status", "--porcelain", "-uno") else "")}
 
 

@@ -43,6 +43,7 @@ def first_picture(material: dict[str, Any], variant: str) -> First:
             capture_output=True,
             text=True,
             check=False,
+            start_new_session=True,  # Ctrl-C is for whoever started it, and waits for the picture
         )
     if done.returncode:
         raise RuntimeError(f"no picture of {material.get('type')!r}: {done.stderr.strip()[-400:]}")
