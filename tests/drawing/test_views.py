@@ -57,7 +57,7 @@ BAD = {
     "NaN": ("slices", {"theta": (np.nan,)}, ParameterError, r"theta = nan.*\[0, 90\)"),
     "NaN azimuth": ("albedo", {"phi": np.nan}, ParameterError, "phi = nan"),
     "NaN difference": ("rusinkiewicz", {"phi_d": np.inf}, ParameterError, "phi_d = inf"),
-    "none": ("lobes", {"theta": ()}, ParameterError, "theta: expected at least one"),
+    "none": ("lobes", {"theta": ()}, ParameterError, r"theta = \(\): expected a number, or a list"),
     "scale": ("lobes", {"scale": "logarithmic"}, UnknownNameError, "unknown scale.*Allowed: linear, log"),
     "channel": ("slices", {"channel": "X"}, UnknownNameError, "unknown channel 'X'.*mean, each, R, G, B"),
     "channels": ("hemisphere", {"channel": "each"}, ParameterError, "a map shows one channel"),

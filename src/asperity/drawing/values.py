@@ -147,8 +147,6 @@ def incidence(
     measured = [material for material in materials if material.measured is not None]
     if theta is not None:
         check_angles([(one, phi) for one in theta])
-        if not len(theta):
-            raise ParameterError("theta: expected at least one angle of incidence.")
         for material in measured:
             for angle in theta:
                 row(material, (angle, phi))
