@@ -29,7 +29,7 @@ class UnreadableFileError(AsperityError):
     """A file that is missing, of another format, or damaged."""
 
     def __init__(self, what: str, path: Path, formats: Collection[str], reason: str):
-        super().__init__(f"cannot read the {what} {str(path)!r}: {reason}. Formats: {', '.join(formats)}.")
+        super().__init__(f"cannot read the {what} {str(path)!r}: {reason.rstrip('.')}. Formats: {', '.join(formats)}.")
 
 
 def suggestion(given: str, allowed: Collection[str]) -> str:

@@ -137,7 +137,7 @@ def test_files_are_found_beside_the_description_and_matrices_scale_them(tmp_path
         ({"material": DIFFUSE, "previw": {}}, "unknown key 'previw'. Did you mean 'preview'"),
         (
             {"material": DIFFUSE, "preview": {"enviroment": "sky"}},
-            "unknown key 'enviroment'.*Allowed: object, env, ",
+            r"unknown key 'enviroment'.*Allowed: object, env, [a-z, ]*\. Formats",
         ),
         ({"material": DIFFUSE, "preview": {"object": 3}}, "preview.object is 3, not a name or the path of a file"),
         ({"material": DIFFUSE, "preview": {"env": None}}, "preview.env is null, not a name"),

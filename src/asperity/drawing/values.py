@@ -22,6 +22,8 @@ ANGLES = (0.0, 30.0, 60.0)
 """Of incidence, in degrees, if none are asked for."""
 MOST = 6
 """Angles that are taken of a measurement unasked."""
+ROOM = 12
+"""Angles at most: of more, the legend leaves no room for curves."""
 STEP, FINE, NEAR = 0.1, 0.01, 2.0
 """Degrees between the points of a curve; the same near the mirrored direction and the light, and how near."""
 HORIZON = 89.95
@@ -147,6 +149,8 @@ def incidence(
     measured = [material for material in materials if material.measured is not None]
     if theta is not None:
         check_angles([(one, phi) for one in theta])
+        if len(theta) > ROOM:
+            raise ParameterError(f"theta: {len(theta)} angles of incidence, and a picture has room for {ROOM}.")
         for material in measured:
             for angle in theta:
                 row(material, (angle, phi))
