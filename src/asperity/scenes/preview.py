@@ -124,7 +124,9 @@ def ground(floor: str) -> Description:
         distance = np.linspace(0, GROUND_RADIUS, 128)
         reflectance, to_uv = (0.18 + 0.4 / (1 + (distance / 9) ** 2))[None, :, None], mi.ScalarTransform3f()
     bitmap = mi.Bitmap(reflectance.astype(np.float32))
-    texture = {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp", "to_uv": to_uv}
+    # Colours become spectra in spectral variants, where raw ones would be an error.
+    raw = reflectance.shape[-1] == 1
+    texture = {"type": "bitmap", "bitmap": bitmap, "raw": raw, "wrap_mode": "clamp", "to_uv": to_uv}
     return {
         "type": "rectangle" if floor == "tiles" else "disk",
         "to_world": mi.ScalarTransform4f().scale(GROUND_RADIUS),
