@@ -85,6 +85,8 @@ SWEEPS: dict[str, tuple[tuple[dict, str, tuple[float, ...]], ...]] = {
 """What a parameter does: a material, the parameter, and its values."""
 STRIP = ("dusty-wood", "verdigris", "gilded", "moldy-glass", "red-flock")
 STRIP += ("worn-copper", "polished-gold", "hematite", "corrugated-plastic", "lacquer-by-normal")
+VIEWS = {"dusty-wood": {"object": "ball", "floor": "tiles"}}
+"""Of presets in that picture, other than their own."""
 
 
 def table(model) -> str:
@@ -167,7 +169,7 @@ def kept_table() -> str:
     return "\n".join(lines)
 
 
-def shot(name: str, size: int, spp: int, finer: int = 1):
+def shot(name: str, size: int, spp: int, finer: int = 1, **view: str):
     """A preset's preview, denoised, perhaps rendered ``finer`` than it is: `PIL.Image`."""
     import mitsuba as mi
     import numpy as np
@@ -178,7 +180,7 @@ def shot(name: str, size: int, spp: int, finer: int = 1):
 
     mi.set_variant("llvm_ad_rgb")
     preset = presets.load(name)
-    scene = mi.load_dict(preview(preset.material, **preset.preview, size=(finer * size,) * 2), parallel=False)
+    scene = mi.load_dict(preview(preset.material, **preset.preview | view, size=(finer * size,) * 2), parallel=False)
     image = denoise.denoised(np.array(mi.render(scene, spp=spp)), *denoise.features(scene))
     bitmap = mi.Bitmap(image).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, srgb_gamma=True)
     return Image.fromarray(np.array(bitmap)).resize((size, size), Image.Resampling.BOX)
@@ -190,7 +192,8 @@ def strip(path: Path, size: int = 240, columns: int = 5, spp: int = 64) -> None:
 
     whole = Image.new("RGB", (columns * size, -(-len(STRIP) // columns) * size))
     for n, name in enumerate(STRIP):
-        whole.paste(shot(name, size, spp, finer=2), (n % columns * size, n // columns * size))
+        picture = shot(name, size, spp, finer=2, **VIEWS.get(name, {}))
+        whole.paste(picture, (n % columns * size, n // columns * size))
     whole.save(path, optimize=True)
 
 
