@@ -18,6 +18,7 @@ from textwrap import fill
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- parameters: made by docs/build.py -->", "<!-- end of parameters -->"
 BEGIN_SPEED, END_SPEED = "<!-- speed: made by docs/build.py -->", "<!-- end of speed -->"
+BEGIN_COSTS, END_COSTS = "<!-- costs: made by docs/build.py -->", "<!-- end of costs -->"
 BEGIN_KEPT, END_KEPT = "<!-- kept: made by docs/build.py -->", "<!-- end of kept -->"
 SPEED = DOCS / "speed.json"
 CALLS, FRAMES = ("eval_pdf", "sample"), ("bare", "preview", "filled")
@@ -141,6 +142,25 @@ def noise(frame: dict) -> str:
 def with_speed(page: str, name: str, report: dict) -> str:
     """The page with the speed of the model ``name`` between the marks, if it has marks."""
     return between(page, BEGIN_SPEED, speed_table(name, report), END_SPEED) if BEGIN_SPEED in page else page
+
+
+def costs_table(report: dict) -> str:
+    """The least and the most that each model's frames take beside Mitsuba's, in Markdown."""
+    lines = ["| | beside | " + " | ".join(f"frame, *{scene}*" for scene in FRAMES) + " |", "|" + "---|" * 5]
+    timed = {row: found for row, found in report["rows"].items() if row != found["against"]}
+    for name in dict.fromkeys(row.split(",")[0] for row in timed):
+        rows = [found for row, found in timed.items() if row.split(",")[0] == name]
+        ranges = []
+        for scene in FRAMES:
+            ratios = sorted(found[scene]["ratio"][1] for found in rows)
+            ranges.append(" to ".join(dict.fromkeys(f"{ratio:.2f}" for ratio in (ratios[0], ratios[-1]))))
+        lines.append(f"| [`{name}`]({name}.md) | {rows[0]['against']} | " + " | ".join(ranges) + " |")
+    return "\n".join(lines)
+
+
+def with_costs(page: str, report: dict) -> str:
+    """The page with what models cost between the marks."""
+    return between(page, BEGIN_COSTS, costs_table(report), END_COSTS)
 
 
 def kept() -> list[list[float]]:
@@ -302,13 +322,14 @@ def plots(folder: Path, page: Path = DOCS / "plotting.md") -> None:
 
 
 def shrink(source: Path, target: Path) -> None:
-    """Write a picture in 256 colours, half as wide, or narrower, until it is no larger than `LARGEST`."""
+    """Write a picture half as wide, or narrower, until it is no larger than `LARGEST`; a PNG in 256 colours."""
     from PIL import Image
 
     image = Image.open(source).convert("RGB")
     for factor in (2, 2.4, 2.8, 3.2, 3.6):
         size = round(image.width / factor), round(image.height / factor)
-        image.resize(size, Image.Resampling.LANCZOS).quantize(256).save(target, optimize=True)
+        small = image.resize(size, Image.Resampling.LANCZOS)
+        (small.quantize(256) if target.suffix == ".png" else small).save(target, optimize=True, quality=70)
         if target.stat().st_size <= LARGEST:
             return
 
@@ -323,7 +344,7 @@ def main() -> None:
         page = DOCS / f"{name}.md"
         page.write_text(with_sweeps(with_speed(with_table(page.read_text(), model), name, report), name))
     page = DOCS / "which.md"
-    page.write_text(between(page.read_text(), BEGIN_KEPT, kept_table(), END_KEPT))
+    page.write_text(between(with_costs(page.read_text(), report), BEGIN_KEPT, kept_table(), END_KEPT))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         gallery(DOCS / "pictures" / "gallery")

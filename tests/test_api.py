@@ -5,6 +5,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import asperity as asp
 from asperity import validation
@@ -153,7 +154,10 @@ def test_a_picture(rgb, tmp_path):
     assert np.array(mi.Bitmap(str(tmp_path / "a.exr"))) == pytest.approx(picture.image, rel=1e-3)  # 16 bits, or more
     assert np.array(mi.Bitmap(str(tmp_path / "a.png"))).dtype == np.uint8
     assert picture.plot().axes[0].images
-    for path, message in (("a.jpg", "its ending has to be one of .png, .exr"), ("b/a.png", "there is no folder")):
+    for path, message in (
+        ("a.jpg", "its ending has to be one of .png, .exr"),
+        ("b/a.png", "cannot write into the fold"),
+    ):
         with pytest.raises(asp.ParameterError, match=message):
             picture.save(tmp_path / path)
 
@@ -163,11 +167,16 @@ def test_presets():
     assert found["gilded"].description["type"] == "micrograin" and len(found) >= 40
 
 
-@pytest.mark.parametrize("materials", [[GREY], [GREY, "gilded"]])
-def test_plots(rgb, materials, tmp_path):
-    figure = asp.plot(*materials, view="slices", theta=[30])
+@pytest.mark.parametrize("materials, theta", [([GREY], 30), ([GREY, "gilded"], np.array([30]))])
+def test_plots(rgb, materials, theta, tmp_path):
+    figure = asp.plot(*materials, view="slices", theta=theta)
     figure.savefig(tmp_path / "slices.png")
     assert len(figure.axes[0].lines) >= len(materials)
+
+
+def test_wavelengths_of_numpy(rgb):
+    names = [text.get_text() for text in asp.plot(GREY, channel="each", wavelengths=np.array([450, 550])).findobj(Text)]
+    assert {"450 nm", "550 nm"} <= {word.strip() for name in names for word in name.split(",")}
 
 
 def test_a_spectrum_needs_no_spectral_variant(rgb):
@@ -248,16 +257,32 @@ BAD = {
         "BSDF of variant llvm_ad_rgb, and llvm_ad_spectral is set",
     ),
     "check": (lambda: asp.check(GREY, ["enrgy"]), "Did you mean 'energy'"),
+    "no check": (lambda: asp.check(GREY, []), "only: expected at least one check"),
+    "settings": (lambda: asp.material("gilded", 3), "settings = 3: expected a mapping"),
+    "memory": (lambda: asp.sample(GREY, UP, 10**14), "GiB for 100000000000000 results"),
+    "tracing": (lambda: asp.measure("vgroove", 0, path=3), "path: makes no sense with measuring. Did you mean 'paths'"),
+    "paths": (lambda: asp.measure("vgroove", 0, paths="many"), "paths = 'many': expected a number"),
+    "sensor": (lambda: asp.measure("vgroove", 0, sensor="retr"), "Did you mean 'retro'"),
     "no geometry": (lambda: asp.measure(GREY), "has no microgeometry to measure"),
     "spacing": (lambda: asp.measure(np.zeros((2, 2))), "spacing: heights need"),
     "unused": (lambda: asp.measure("vgroove", bsdf=GREY), "bsdf: makes no sense"),
     "horizontal": (lambda: asp.measure("vgroove", 90), "theta = 90"),
     "size": (lambda: asp.render(GREY, size=0), "width = 0: expected a whole number"),
+    "sides": (lambda: asp.render(GREY, size=(4, 4, 4)), r"size = \(4, 4, 4\): expected a whole number, or a width"),
+    "too much": (
+        lambda: asp.render(GREY, size=2**15, spp=64),
+        "spp = 64: expected a whole number, at least 1 and at mo",
+    ),
+    "view's": (lambda: asp.render(GREY, lihgt="key"), "lihgt: makes no sense with the preview scene. .* 'light'"),
     "object": (lambda: asp.render(GREY, object="pwan"), "Did you mean 'pawn'"),
     "view": (lambda: asp.plot(GREY, view="lobe"), "Did you mean 'lobes'"),
+    "no view": (lambda: asp.plot(GREY, view=None), "unknown view None"),
+    "no angles": (lambda: asp.plot(GREY, theta=[]), r"theta = \[\]: expected a number, or a list"),
+    "words of angles": (lambda: asp.plot(GREY, theta="up"), "theta = 'up': expected a number, or a list"),
     "nothing": (lambda: asp.plot(), "expected at least one"),
     "option": (lambda: asp.plot(GREY, theta_i=[3]), "theta_i: makes no sense with view lobes"),
     "paper": (lambda: asp.validate("vgrove", "nowhere"), "Did you mean 'vgroove'"),
+    "a file": (lambda: asp.validate("vgroove", __file__), "cannot make this folder: File exists"),
     "no model": (lambda: asp.register(int), "expected a class derived from asperity.lobes.LobeModel"),
     "a texture's": (lambda: asp.register(Lambert, "settled"), "name = 'settled': there is such a plugin already"),
     "our name": (lambda: asp.register(Lambert, "vgroove"), "name = 'vgroove': there is such a plugin already"),

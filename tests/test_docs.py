@@ -54,6 +54,11 @@ def test_all_models_are_timed_and_have_a_table_of_it():
     assert timed == models().keys() == {name for name, page in PAGES.items() if build.BEGIN_SPEED in page}
 
 
+def test_costs_are_those_of_the_benchmark():
+    report = json.loads(build.SPEED.read_text())
+    assert build.with_costs(PAGES["which"], report) == PAGES["which"], "run `python docs/build.py`"
+
+
 @pytest.mark.slow
 def test_light_that_is_kept_is_what_the_page_says():
     """Two digits are printed; the means of the samples have standard errors of .001."""

@@ -159,7 +159,7 @@ def test_a_bsdf_of_another_variant(rgb):
     [
         ("gilded", ["tau_0"], "--set tau_0: expected NAME=VALUE"),
         ("gilded", ["bse.alpha=1"], "nothing is nested as 'bse'. Did you mean 'base'?"),
-        (None, ["a=1"], "settings change a description, and this is a BSDF"),
+        (None, ["a=1"], "settings change a description, and this is a BSDF that is loaded"),
     ],
 )
 def test_bad_settings(rgb, what, settings, message):

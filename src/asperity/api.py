@@ -15,6 +15,7 @@ which then costs half a second more. A BSDF that is loaded already has to be of 
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,7 +30,7 @@ from numpy.typing import ArrayLike
 from . import drawing, goniophotometer, loading, models, plugin, validation, variants
 from .arrays import CHUNK, Array, Directions, mapped
 from .drawing import comparison
-from .errors import ParameterError, refuse_unused, whole
+from .errors import ParameterError, listed, refuse_unknown, refuse_unused, whole
 from .goniophotometer.mesh import MESHES
 from .lab import checks
 from .lab import evaluate as lab
@@ -37,11 +38,17 @@ from .materials import ABOVE, Material, resolve
 from .parameters import Declared
 from .results import Checks, Compared, Picture, Samples
 from .scenes import presets as _presets
+from .scenes.preview import preview
 
 NM = (360.0, 830.0)
 """Wavelengths that Mitsuba knows."""
 SOBOL = 2**14
 """Samples of an albedo: of smooth BSDFs it has four digits then."""
+SAMPLES = 2**32 - 1
+"""Most of a picture that Mitsuba renders at once."""
+MEASURING = [*inspect.signature(goniophotometer.measure).parameters][2:]
+VIEWING = [name for name in inspect.signature(preview).parameters if name not in ("material", "size", "spp", "seed")]
+"""Options that `measure` and `render` pass on."""
 
 material = resolve
 Model = TypeVar("Model")
@@ -98,7 +105,7 @@ def albedo(
 
     It is the mean weight of ``samples`` points of Sobol's sequence, a power of two: the same in every call.
     """
-    samples = whole("samples", samples, 1)
+    samples = whole("samples", samples, 1, 2**24)
     if samples & (samples - 1):
         raise ParameterError(f"samples = {samples}: expected a power of two, such as {SOBOL}.")
     with _loaded(material, wavelengths) as target:
@@ -152,7 +159,9 @@ def check(
     variants.ensure()
     found = resolve(material)
     bsdf = found.load()
-    names = [only] if isinstance(only, str) else only
+    names = [only] if isinstance(only, str) else list(only)
+    if not names:
+        raise ParameterError(f"only: expected at least one check. {listed(checks.NAMES)}")
     return Checks(found.name, tuple(checks.check(found.description or bsdf, progress, names)))
 
 
@@ -171,8 +180,11 @@ def measure(
     ``what`` is a material whose model has a microgeometry; a mesh, .ply or .obj; heights, an array (rows, columns); or
     any `goniophotometer.Microgeometry`. A mesh and heights take the ``bsdf`` of their facets, and whether they go on
     ``periodic``: `goniophotometer.Mesh` says how; heights need the ``spacing`` of their samples. ``options`` are those
-    of `goniophotometer.measure`: paths, orders, apart, sensor, tiles, seed, ...
+    of `goniophotometer.measure`: paths, orders, apart, sensor (or the name of one), tiles, seed, ...
     """
+    refuse_unknown(options, MEASURING, "measuring")
+    if isinstance(sensor := options.get("sensor"), str):
+        options["sensor"] = goniophotometer.sensors.by_name(sensor)
     surface = {"bsdf": bsdf, "spacing": spacing, "periodic": periodic}
     incident = [(float(t), float(p)) for t, p in _angles(theta, phi).reshape(-1, 2)]
     with variants.switched(variants.of_arrays(options.get("wavelengths") is not None)):
@@ -218,12 +230,13 @@ def render(
 
     ``object`` and ``env``, say. A preset has its own, which are the default.
     """
-    from .scenes.preview import preview
-
     variants.ensure()
-    width, height = size if isinstance(size, tuple) else (size, size)
-    for name, value, most in (("width", width, 2**15), ("height", height, 2**15), ("spp", spp, 2**31)):
-        whole(name, value, 1, most)
+    refuse_unknown(view, VIEWING, "the preview scene")
+    sides = tuple(size) if isinstance(size, (tuple, list)) else (size, size)
+    if len(sides) != 2:
+        raise ParameterError(f"size = {loading.short(size)}: expected a whole number, or a width and a height.")
+    width, height = (whole(name, side, 1, 2**15) for name, side in zip(("width", "height"), sides))
+    whole("spp", spp, 1, SAMPLES // (width * height))
     whole("seed", seed, 0, 2**32 - 1)
     found = resolve(material)
     bsdf = found.load()

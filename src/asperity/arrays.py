@@ -6,6 +6,7 @@ are: of 3, unit vectors; of 2, the angles θ from the normal and φ, in degrees.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -99,7 +100,11 @@ def mapped(
     except ValueError:
         shapes = " and ".join(f"{each.name} of {each.array.shape}" for each in directions)
         raise ParameterError(f"{shapes}: these shapes do not go together, but for their last axis.") from None
-    result = np.empty((*shape, width)) if out is None else out
+    try:
+        result = np.empty((*shape, width)) if out is None else out
+    except MemoryError:
+        need = 8 * width * math.prod(shape) / 2**30
+        raise ParameterError(f"{need:.3g} GiB for {math.prod(shape)} results: ask for fewer at a time.") from None
     if not (isinstance(result, np.ndarray) and result.dtype.kind == "f" and result.flags.writeable):
         raise ParameterError("out: expected an array of floating-point numbers that may be written to.")
     if result.shape != (*shape, width):

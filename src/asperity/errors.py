@@ -39,7 +39,7 @@ def suggestion(given: str, allowed: Collection[str]) -> str:
 
 def nearest(given: str, allowed: Collection[str]) -> str:
     """A question whether the nearest of the allowed names was meant, and a space; nothing if none is near."""
-    found = difflib.get_close_matches(given, allowed, n=1, cutoff=0.5)
+    found = difflib.get_close_matches(str(given), allowed, n=1, cutoff=0.5)
     return f"Did you mean {found[0]!r}? " if found else ""
 
 
@@ -53,6 +53,13 @@ def refuse_unused(options: Mapping[str, Any], used: Collection[str], what: str) 
     for option, value in options.items():
         if value is not None and option not in used:
             raise ParameterError(f"{option}: makes no sense with {what}.")
+
+
+def refuse_unknown(options: Collection[str], known: Collection[str], what: str) -> None:
+    """Raise ParameterError if an option is none of those that ``what`` has."""
+    for option in options:
+        if option not in known:
+            raise ParameterError(f"{option}: makes no sense with {what}. {suggestion(option, known)}")
 
 
 def whole(name: str, value: Any, least: int, most: int = 2**63 - 1) -> int:

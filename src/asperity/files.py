@@ -7,8 +7,9 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
-from .errors import AsperityError
+from .errors import AsperityError, ParameterError
 
 try:
     import fcntl
@@ -66,3 +67,25 @@ def locked(path: Path) -> Iterator[None]:
             with suppress(OSError):
                 lock.unlink()
             os.close(file)
+
+
+def check_folder(out: Path, name: str) -> None:
+    """Raise ParameterError if nothing can be written beside ``out``."""
+    parent = out.resolve().parent
+    try:
+        with TemporaryFile(dir=parent):
+            pass
+    except OSError as error:
+        raise ParameterError(
+            f"{name} {out}: cannot write into the folder {str(out.parent)!r}: {error.strerror}."
+        ) from error
+
+
+def folder(path: str | Path, name: str) -> Path:
+    """The folder of that path, which is made if it is not there; raises ParameterError, as ``name`` = path."""
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ParameterError(f"{name} = {str(path)!r}: cannot make this folder: {error.strerror}.") from error
+    return path

@@ -104,7 +104,8 @@ def resolve(what: Any, settings: Iterable[str] | Mapping[str, Any] = ()) -> Mate
     if not settings:
         return found
     if found.description is None:
-        raise ParameterError(f"{found.name}: settings change a description, and this is a {_kind(what)}.")
+        kind = "measurement" if found.measured is not None else "BSDF that is loaded already"
+        raise ParameterError(f"{found.name}: settings change a description, and this is a {kind}.")
     return replace(found, description=changed(found.description, settings))
 
 
@@ -239,6 +240,8 @@ def changed(description: Description, settings: Iterable[str] | Mapping[str, Any
     """A description with other parameters. Whether they exist is for the plugin to say; raises ParameterError."""
     from . import loading
 
+    if not isinstance(settings, Iterable):
+        raise ParameterError(f"settings = {loading.short(settings)}: expected a mapping, or texts NAME=VALUE.")
     changes = settings.items() if isinstance(settings, Mapping) else map(_setting, settings)
     result = _copied(description)
     for path, new in changes:

@@ -56,10 +56,14 @@ DIFFRACTING: Group = {
 GROUPS: tuple[Group, ...] = (METALS, MATTE, PLASTICS, DIFFRACTING)
 
 EXTRA = {
-    *("micrograin, on a diffuse base", "micrograin, coated grains", "vgroove, alpha 0.1", "vgroove, alpha 1"),
+    *("micrograin, on a diffuse base", "micrograin, scattering: multiple", "micrograin, coated grains"),
+    *("vgroove, alpha 0.1", "vgroove, alpha 1"),
     *("deon", "merillou", "lambertsphere, published", "lambertsphere, fast", "lambertsphere, accurate, coloured"),
     *("orennayar, qualitative", "twoscale, conserving", "twoscale, anisotropic"),
-    *(f"interfacedlambertian, {name}" for name in ("Beckmann", "textured alpha", "approximate", "all bounces")),
+    *(
+        f"interfacedlambertian, {name}"
+        for name in ("Beckmann", "V-cavities", "textured alpha", "approximate", "all bounces")
+    ),
 }
 """Left out if there is little time: compiling takes most of it."""
 

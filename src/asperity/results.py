@@ -12,9 +12,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from . import drawing, variants
+from . import drawing, files, variants
 from .errors import ParameterError
-from .files import atomically
 from .lab import pictures
 from .lab.checks import Result
 from .lab.compare import Comparison
@@ -69,12 +68,11 @@ class Checks:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write these figures as PNG into a folder, which is made; return their paths."""
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = files.folder(folder, "folder")
         drawn = [result for result in self.failed if result.evidence is not None]
         paths = [folder / f"{self.name}-{result.name}.png" for result in drawn]
         for result, path in zip(drawn, paths):
-            with atomically(path) as part:
+            with files.atomically(path) as part:
                 pictures.write(result, part)
         return paths
 
@@ -102,7 +100,7 @@ class Compared:
         path = _writable(path, FIGURES)
         if path.suffix.lower() != ".json":
             return drawing.style.save(self.plot(), path)
-        with atomically(path) as part:
+        with files.atomically(path) as part:
             part.write_text(json.dumps(self.numbers, indent=2) + "\n", encoding="utf-8")
 
 
@@ -126,7 +124,7 @@ class Picture:
     def save(self, path: str | Path) -> None:
         """Write a PNG, in sRGB and clipped at 1, or an EXR, of what there is; by the ending."""
         path = _writable(path, PICTURES)
-        with atomically(path) as part:
+        with files.atomically(path) as part:
             self._bitmap(path.suffix.lower()).write(str(part))
 
     def _bitmap(self, ending: str) -> Any:
@@ -141,6 +139,5 @@ def _writable(path: str | Path, formats: tuple[str, ...]) -> Path:
     path = Path(path)
     if path.suffix.lower() not in formats:
         raise ParameterError(f"path = {str(path)!r}: its ending has to be one of {', '.join(formats)}.")
-    if not path.absolute().parent.is_dir():
-        raise ParameterError(f"path = {str(path)!r}: there is no folder {str(path.parent)!r}.")
+    files.check_folder(path, "path")
     return path

@@ -18,6 +18,13 @@ def test_a_wrong_bsdf(asperity, tmp_path):
     assert (tmp_path / "wrong" / "diffuse-energy.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_pictures_in_a_file(asperity, tmp_path):
+    """Refused before anything is checked."""
+    (tmp_path / "wrong").touch()
+    result = asperity("check", "diffuse", "--pictures", "wrong")
+    assert result.exit_code == 2 and result.output == "error: --pictures wrong: it is a file. Name a folder.\n"
+
+
 def test_a_material_file(asperity, tmp_path):
     (tmp_path / "gold.json").write_text('{"type": "conductor", "material": "Au"}')
     result = asperity("check", "--material", "gold.json", "--set", "material=Ag")

@@ -1,6 +1,9 @@
 """All views: each draws any material, and says what it cannot draw."""
 
 from known import GOLD, GRAINS, GROOVES, lambertian, measurement  # isort: skip
+import re
+from pathlib import Path
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -54,7 +57,7 @@ BAD = {
     "NaN": ("slices", {"theta": (np.nan,)}, ParameterError, r"theta = nan.*\[0, 90\)"),
     "NaN azimuth": ("albedo", {"phi": np.nan}, ParameterError, "phi = nan"),
     "NaN difference": ("rusinkiewicz", {"phi_d": np.inf}, ParameterError, "phi_d = inf"),
-    "none": ("lobes", {"theta": ()}, ParameterError, "theta: expected at least one"),
+    "none": ("lobes", {"theta": ()}, ParameterError, r"theta = \(\): expected a number, or a list"),
     "scale": ("lobes", {"scale": "logarithmic"}, UnknownNameError, "unknown scale.*Allowed: linear, log"),
     "channel": ("slices", {"channel": "X"}, UnknownNameError, "unknown channel 'X'.*mean, each, R, G, B"),
     "channels": ("hemisphere", {"channel": "each"}, ParameterError, "a map shows one channel"),
@@ -105,6 +108,10 @@ def test_names_that_are_the_same_get_what_differs(measured):
     one, two = ({"type": "micrograin", "tau_0": tau, "beta": 1} for tau in (0.2, 0.4))
     named = drawing.distinct_names([Material("rust", one), Material("dust", one), Material("rust", two)])
     assert named == ["rust, tau_0 = 0.2", "dust", "rust, tau_0 = 0.4"]
+    nested = [
+        Material("rust", {"type": "micrograin", "base": {"type": "diffuse", "reflectance": r}}) for r in (0.2, 0.5)
+    ]
+    assert drawing.distinct_names(nested) == ["rust, base.reflectance = 0.2", "rust, base.reflectance = 0.5"]
     assert drawing.distinct_names([measured, measured]) == ["measured (1)", "measured (2)"]
 
 
@@ -122,3 +129,13 @@ def test_what_was_not_measured_is_not_drawn(rgb, measured):
     mi.set_variant("llvm_ad_spectral")
     with pytest.raises(ParameterError, match=r"variant llvm_ad_spectral.*other channels there than measured.*R, G, B"):
         drawing.plot([measured, lambertian()], "slices")
+
+
+def test_the_page_shows_every_view():
+    """A section each, with a picture that is there, and small."""
+    docs = Path(__file__).parents[2] / "docs"
+    page = (docs / "plotting.md").read_text()
+    assert set(drawing.VIEWS) <= set(re.findall("^## (.*)$", page, re.MULTILINE))
+    pictures = re.findall(r"\]\((pictures/.*?)\)", page)
+    assert len(pictures) == len(drawing.VIEWS) + 1
+    assert all((docs / picture).stat().st_size <= 60_000 for picture in pictures)

@@ -1,8 +1,11 @@
 """`lab.bench`: what is measured, in small."""
 
+import asperity  # noqa: F401  isort: skip
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from asperity.errors import ParameterError
 from asperity.lab import bench
 from asperity.lab.bench import first, timing
 
@@ -28,6 +31,10 @@ def test_variance_of_known_noise():
     pictures = list(5 + 0.5 * np.random.default_rng(0).normal(size=(4, 100, 100, 4)))
     assert bench.relative_variance(pictures) == pytest.approx(0.01, rel=0.04)
     assert len(bench.relative_variance(pictures)) == 3
+
+
+def test_black_pictures_have_no_noise():
+    assert list(bench.relative_variance([np.zeros((2, 2, 3))] * 3)) == [0, 0]
 
 
 def test_a_group(monkeypatch):
@@ -56,6 +63,18 @@ def test_the_first_picture_of_a_new_process():
     ballast = np.ones(2**27)  # 1 GiB
     found = first.first_picture(METAL, "scalar_rgb")
     assert 0 < found.wall < 120 and found.cpu > 0 and 50 < found.memory < ballast.nbytes / 2**20
+
+
+@pytest.mark.parametrize("size", [3, 4])
+def test_transformations_reach_a_new_process(size):
+    turn = {3: mi.ScalarTransform3f().rotate(30), 4: mi.ScalarTransform4f().rotate([0, 0, 1], 30)}[size]
+    (heard,) = first.heard(first.told({"to_uv": turn})).values()
+    assert type(heard) is type(turn) and np.allclose(heard.matrix, turn.matrix)
+
+
+def test_what_cannot_be_told():
+    with pytest.raises(ParameterError, match="a Bitmap"):
+        first.told({"texture": {"bitmap": mi.Bitmap(np.zeros((2, 2, 3), np.float32))}})
 
 
 def test_a_picture_that_cannot_be_made_is_told():

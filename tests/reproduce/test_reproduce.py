@@ -2,6 +2,7 @@
 
 import json
 
+import mitsuba as mi
 import pytest
 
 from asperity import reproduce as reproduction
@@ -91,6 +92,23 @@ def test_what_was_made_otherwise_is_kept_unless_forced(made, tmp_path, monkeypat
     assert made == ["first", "second"] and (tmp_path / "vgroove.md").read_text() == before
     reproduction.reproduce("vgroove", tmp_path, force=True, **other)
     assert made == ["first", "second"] * 2
+
+
+def test_presets_are_code_too(tmp_path, monkeypatch):
+    """Renders are of them."""
+    monkeypatch.setattr(kept, "PACKAGE", tmp_path)
+    digests = set()
+    for reflectance in "0.5", "0.6":
+        (tmp_path / "preset.json").write_text(reflectance)
+        digests.add(kept.code_digest.__wrapped__())
+    assert len(digests) == 2
+
+
+def test_no_measurements_without_arrays(made, tmp_path):
+    mi.set_variant("scalar_rgb")
+    with pytest.raises(ParameterError, match="variant scalar_rgb: measuring needs one that computes on arrays"):
+        reproduction.reproduce("vgroove", tmp_path)
+    assert not made and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("damage", ["{", "[]", '{"section": {"title": 1}}'])

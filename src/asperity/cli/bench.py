@@ -112,10 +112,13 @@ def chosen(targets: list[str], settings: list[str], against: str | None, quick: 
 
 def described(target: str, settings: list[str]) -> tuple[str, dict[str, Any]]:
     """The name and the description of a material, which other processes can load too."""
+    from asperity.lab.bench import first
+
     material = resolve(target, settings)
     if material.description is None:
         raise ParameterError(f"{target}: only what has a description can be timed; a measurement has none.")
     material.load()  # complains in one line
+    first.told(material.description)
     return ", ".join([material.name, *settings]), material.description
 
 
@@ -129,7 +132,9 @@ def about() -> dict[str, Any]:
         except OSError:
             return ""
 
-    commit = git("rev-parse", "--short", "HEAD") or __version__
+    if not git("ls-files", Path(__file__).name):  # installed, perhaps within somebody's repository
+        return {"asperity": __version__, "commit": __version__}
+    commit = git("rev-parse", "--short", "HEAD")
     return {"asperity": __version__, "commit": commit + ("+" if git("status", "--porcelain", "-uno") else "")}
 
 
@@ -137,18 +142,25 @@ def tabulated(rows: dict[str, dict[str, Any]]) -> Table:
     """The rows of a group."""
     reference = next(iter(rows))
     table = Table("", *COLUMNS, title=f"over {reference}", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    table.columns[0].no_wrap = True
     for name, row in rows.items():
-        cells = [f"{spread(row[call]['ratio'])}\n{row[call]['time'][1]:.3g} ns" for call in ("eval_pdf", "sample")]
+        cells = [f"{spread(row[call]['ratio'])}\n{brief(row[call]['time'][1])} ns" for call in ("eval_pdf", "sample")]
         for frame in ("bare", "preview", "filled"):
-            cells.append(f"{spread(row[frame]['ratio'])}\n{1e3 * row[frame]['time'][1]:.3g} ms")
+            cells.append(f"{spread(row[frame]['ratio'])}\n{brief(1e3 * row[frame]['time'][1])} ms")
         cells.append(f"{spread(row['first']['ratio'])}\n{row['first']['time'][1]:.2f} s")
         cells.append(f"{row['memory']['ratio'][1]:.2f}\n{row['memory']['value'][1]:.0f} MiB")
         cells += [f"{spread(row[frame]['noise'])}\n{spread(row[frame]['work'])}" for frame in ("filled", "point")]
-        table.add_row(name, *cells)
+        table.add_row(name.replace(", ", ",\n", 1), *cells)
     return table
+
+
+def brief(number: float) -> str:
+    """Three digits, or all before the point."""
+    return f"{number:.3g}" if number < 100 else f"{number:.0f}"
 
 
 def spread(quartiles: list[float]) -> str:
     """The median, and half the distance of the others."""
     low, middle, high = quartiles
-    return f"{middle:.2f}±{(high - low) / 2:.2f}"
+    half = (high - low) / 2
+    return f"{middle:.2f}±{half:.2f}" if middle < 10 else f"{middle:.3g}±{half:.2g}"

@@ -36,6 +36,8 @@ def check(
     """Check a BSDF: sampling, reciprocity, energy, gradients and more. The exit code is 1 if a check fails."""
     if sum(way is not None for way in (target, preset, material)) != 1:
         raise ParameterError("give one of: a material, --preset, --material.")
+    if pictures.exists() and not pictures.is_dir():
+        raise ParameterError(f"--pictures {pictures}: it is a file. Name a folder.")
     with console.status("loading"):
         from asperity.lab import checks
         from asperity.lab import plugins as own

@@ -36,7 +36,10 @@ def compare(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="PNG, PDF or SVG. Default: A-B.png.")] = None,
     force: output.Force = False,
 ) -> None:
-    """Compare two materials: numbers, and a figure of maps, slices, albedos, and previews. --set changes B."""
+    """Compare two materials: numbers, and a figure of maps, slices, albedos, and previews.
+
+    --set changes the second.
+    """
     stems = [plot.default_path(one, None).stem for one in (first, second)]
     inputs = [*(one if plot.is_text(one) else Path(one) for one in (first, second)), *(settings or [])]
     default = Path(f"{'-'.join(stems)}.png")

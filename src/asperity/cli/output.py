@@ -8,13 +8,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from asperity.errors import ParameterError
-from asperity.files import TakenError, atomically, locked
+from asperity.files import TakenError, atomically, check_folder, locked
 
 from . import channels
 
@@ -128,18 +127,6 @@ def is_input(file: Path, one: Path | str) -> bool:
             beside = ((given.parent / word, Path(word)) for word in words)
             waiting += [near if os.path.isfile(near) else far for near, far in beside]
     return False
-
-
-def check_folder(out: Path, option: str) -> None:
-    """Raise ParameterError if nothing can be written beside ``out``."""
-    parent = out.resolve().parent
-    try:
-        with TemporaryFile(dir=parent):
-            pass
-    except OSError as error:
-        raise ParameterError(
-            f"{option} {out}: cannot write into the folder {str(out.parent)!r}: {error.strerror}."
-        ) from error
 
 
 def write(path: Path, image: np.ndarray, names: list[str]) -> None:

@@ -72,7 +72,10 @@ def plot(
     ] = None,
     force: output.Force = False,
 ) -> None:
-    """Plot materials: their lobes, slices, maps, albedos, spectra or sampling; models and measurements together."""
+    """Plot materials: their lobes, slices, maps, albedos, spectra or sampling; models and measurements together.
+
+    --set changes the last of them.
+    """
     options = {
         "theta": theta, "phi": phi, "scale": scale, "cosine": None if cosine else False, "channel": channel,
         "wavelengths": wavelengths, "isolines": isolines or None, "parts": parts, "theta_o": theta_o, "phi_d": phi_d,
@@ -87,8 +90,8 @@ def plot(
     default = default_path(given[0], None if whole else view or VIEW)
     [path] = ctx.with_resource(output.files(out, default, FORMATS, force=force, inputs=inputs))
     with console.status("drawing"):
-        # Settings are of the first, so that a material can be drawn beside itself.
-        shown = [resolve(one, settings or [] if n == 0 else []) for n, one in enumerate(given)]
+        # Settings are of the last, so that a material can be drawn beside itself.
+        shown = [*(resolve(one) for one in given[:-1]), resolve(given[-1], settings or [])]
         variants.choose(variant or (SPECTRAL if view == "spectrum" or wavelengths else suited(shown)))
         from asperity import drawing
 

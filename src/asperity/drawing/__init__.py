@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
+import numpy as np
 
-from asperity.errors import ParameterError, UnknownNameError, suggestion
+from asperity.errors import ParameterError, UnknownNameError, refuse_unknown
 from asperity.loading import short
 
 from . import albedo, comparison, hemisphere, lobe3d, lobes, rusinkiewicz, sampling, slices, spectrum, style
@@ -35,8 +36,13 @@ VIEWS: dict[str, Callable[..., Figure]] = {
 """Each takes materials and options by name, and gives a figure; the first line of its docstring says what it shows."""
 MEASURED = ("lobes", "slices", "hemisphere", "albedo", "comparison")
 """Views that draw what was measured itself; the others draw a BSDF that interpolates it."""
+MOST = 3
+"""Parameters in a name that tells materials apart."""
 ALL_LIGHT = ("albedo", "comparison")
 """Where mirrors are seen, too."""
+
+NUMBERS = ("theta", "theta_o", "wavelengths")
+"""Options that are several numbers, or one."""
 
 
 def plot(materials: Sequence[Material], view: str = "lobes", **options: Any) -> Figure:
@@ -58,12 +64,24 @@ def plot(materials: Sequence[Material], view: str = "lobes", **options: Any) -> 
         raise UnknownNameError("view", view, VIEWS)
     if not materials:
         raise ParameterError("materials: expected at least one.")
-    known = option_names(view)
-    for name in options.keys() - set(known):
-        raise ParameterError(f"{name}: makes no sense with view {view}. {suggestion(name, known)}")
+    refuse_unknown(options, option_names(view), f"view {view}")
+    options = {name: _numbers(name, value) if name in NUMBERS else value for name, value in options.items()}
     named = [replace(one, name=name) for one, name in zip(materials, distinct_names(materials))]
     with style.applied():
         return VIEWS[view]([_loaded(material, view) for material in named], **options)
+
+
+def _numbers(name: str, given: Any) -> list[float] | None:
+    """Those of an option, as a list; raises ParameterError."""
+    if given is None:
+        return None
+    try:
+        found = np.atleast_1d(np.asarray(given, dtype=float))
+    except (TypeError, ValueError):
+        found = np.zeros((0, 0))
+    if found.ndim != 1 or not found.size:
+        raise ParameterError(f"{name} = {short(given)}: expected a number, or a list of numbers.")
+    return [float(number) for number in found]
 
 
 def compared(a: Material, b: Material, found: Comparison, previews: Previews | None = None) -> Figure:
@@ -95,9 +113,23 @@ def distinct_names(materials: Sequence[Material]) -> list[str]:
 
 
 def _differing(description: Any, others: Sequence[Any]) -> list[str]:
-    """The parameters of a description that others have not, or have otherwise."""
-    keys = [key for key, value in description.items() if any(one.get(key, ...) != value for one in others)]
-    return [f"{key} = {short(description[key])}" for key in keys]
+    """The parameters of a description that others have not, or have otherwise; the first few."""
+    leaves, *rest = (dict(_leaves(one)) for one in (description, *others))
+    found = [
+        f"{key} = {short(value)}" for key, value in leaves.items() if any(one.get(key, ...) != value for one in rest)
+    ]
+    return found if len(found) <= MOST else [*found[:MOST], "..."]
+
+
+def _leaves(description: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Parameters by their dotted names; a colour is its value."""
+    for key, value in description.items():
+        if isinstance(value, dict) and value.get("type") == "rgb":
+            yield path + key, value.get("value")
+        elif isinstance(value, dict):
+            yield from _leaves(value, f"{path}{key}.")
+        else:
+            yield path + key, value
 
 
 def _loaded(material: Material, view: str) -> Material:

@@ -64,7 +64,7 @@ def maps(materials: Sequence[Material], found: Comparison, incident: np.ndarray,
     norm = style.norm([a, b], "log")
     for axes, material, map in zip(places, materials, (a, b)):
         image = hemisphere.disc(axes, map, norm, incident)
-        axes.set_title(rf"{material.name}, {style.THETA_I} = {incident[0]:g}°")
+        axes.set_title(style.wrapped(rf"{material.name}, {style.THETA_I} = {incident[0]:g}°"))
     relative = relative_map(materials, found, incident, a, b)
     sizes = np.abs(relative[np.isfinite(relative)])
     end = float(np.clip(np.quantile(sizes, 0.95), 0.01, 1)) if len(sizes) else 1.0
@@ -137,6 +137,6 @@ def pictures(materials: Sequence[Material], previews: Previews, figure: Any) -> 
 
 
 def _picture(axes: Axes, image: np.ndarray, title: str, **look: Any) -> Any:
-    axes.set_title(title, fontsize=7)
+    axes.set_title(style.wrapped(title, 28), fontsize=7)
     axes.set_axis_off()
     return axes.imshow(image, **look)

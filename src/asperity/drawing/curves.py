@@ -86,6 +86,6 @@ def draw(axes: Axes, curve: Curve, line: Line) -> None:
 def finish(made: Figure, axes: Sequence[Axes], panels: Sequence[Panel]) -> Figure:
     """Titles and the legend."""
     for place, panel in zip(axes, panels):
-        place.set_title(panel.title)
+        place.set_title(style.wrapped(panel.title))
     style.legend(made, axes)
     return made

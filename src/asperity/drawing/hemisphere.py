@@ -60,11 +60,12 @@ def figure(
 def label(grid: np.ndarray, rows: Sequence[str], columns: Sequence[str]) -> None:
     """Names of materials, and of what is shown of them, beside and above discs (rows, columns)."""
     for axes, column in zip(grid[0], columns):
-        axes.set_title(column if len(rows) > 1 or len(columns) > 1 else f"{rows[0]}, {column}")
+        axes.set_title(style.wrapped(column if len(rows) > 1 or len(columns) > 1 else f"{rows[0]}, {column}"))
     if len(rows) == 1 and len(columns) > 1:
         grid[0, 0].figure.suptitle(rows[0], fontsize=8)
     for axes, row in zip(grid[:, 0], rows if len(rows) > 1 else ()):
-        axes.text(-0.06, 0.5, row, transform=axes.transAxes, rotation=90, ha="right", va="center")
+        look = {"rotation": 90, "ha": "right", "va": "center", "multialignment": "center"}
+        axes.text(-0.06, 0.5, style.wrapped(row), transform=axes.transAxes, **look)
 
 
 def grid_of(rows: int, columns: int) -> tuple[Figure, np.ndarray]:

@@ -43,7 +43,7 @@ def figure(
         wo = mesh(angle, phi)
         f = values.one(values.at(material, directions([(angle, phi)]), wo, wavelengths), index)
         surface(axes, wo, f if cosine else f / wo[..., 2], scale, (angle, phi))
-        axes.set_title(rf"{material.name}, {style.THETA_I} = {angle:g}°", y=0.97)
+        axes.set_title(style.wrapped(rf"{material.name}, {style.THETA_I} = {angle:g}°"), y=0.97)
     return made
 
 

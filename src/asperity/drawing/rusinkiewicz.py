@@ -43,7 +43,7 @@ def figure(
     for axes, material, map in zip(places, materials, found):
         image = axes.imshow(style.visible(map, norm), origin="lower", extent=(0, 90, 0, 90), norm=norm, cmap=style.MAP)
         ticks = {"xticks": range(0, 91, 30), "yticks": range(0, 91, 30), "facecolor": "0.85"}
-        axes.set(title=material.name, xlabel=r"$\theta_h$ [°]", **ticks)
+        axes.set(title=style.wrapped(material.name), xlabel=r"$\theta_h$ [°]", **ticks)
     places[0].set_ylabel(r"$\theta_d$ [°]")
     made.colorbar(image, ax=places, label=style.quantity(False), fraction=0.05, pad=0.02, extend="max")
     return made

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -20,7 +21,6 @@ from asperity.files import atomically
 
 COLUMN, PAGE = 3.35, 7.0
 """Inches: one column of a paper (8.5 cm), and both."""
-FORMATS = (".png", ".pdf", ".svg")
 SCALES = ("linear", "log")
 DECADES = 4
 """Below the largest value: what is less is not told apart on logarithmic scales."""
@@ -113,6 +113,12 @@ def legend(made: FigureBase, axes: Sequence[Axes]) -> None:
         widest = max(len(re.sub(r"\$.*?\$", "x", name)) for name in named)
         columns = max(1, int(made.bbox.width / made.dpi * 14 / (widest + 5)))
         made.legend(named.values(), named.keys(), loc="outside lower center", ncols=min(columns, len(named)))
+
+
+def wrapped(title: str, width: int = 34) -> str:
+    """A title in lines of so many letters, where a formula counts as one; names stay with their values."""
+    short = re.sub(r"\$.*?\$", "x", title)
+    return title if len(short) <= width else fill(title.replace(" = ", "\u00a0=\u00a0"), width)
 
 
 def check_scale(scale: str) -> str:

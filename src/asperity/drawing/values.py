@@ -62,12 +62,10 @@ def channels(materials: Sequence[Material], wavelengths: Sequence[float] | None 
 
 def _check_variant(wavelengths: Sequence[float] | None) -> None:
     """Raise ParameterError if no curve can be computed in the variant in use."""
-    variant = evaluate.active_variant()
-    if not dr.is_jit_v(mi.Float):
-        raise ParameterError(f"variant {variant}: pictures need one that computes on arrays, such as llvm_ad_rgb.")
+    evaluate.require_arrays("drawing")
     if wavelengths is not None and not mi.is_spectral:
         raise ParameterError(
-            f"wavelengths: variant {variant} has none. Choose a spectral one, such as llvm_ad_spectral."
+            f"wavelengths: variant {mi.variant()} has none. Choose a spectral one, such as llvm_ad_spectral."
         )
     for wavelength in wavelengths or ():
         if not mi.MI_CIE_MIN <= wavelength <= mi.MI_CIE_MAX:
@@ -149,8 +147,6 @@ def incidence(
     measured = [material for material in materials if material.measured is not None]
     if theta is not None:
         check_angles([(one, phi) for one in theta])
-        if not len(theta):
-            raise ParameterError("theta: expected at least one angle of incidence.")
         for material in measured:
             for angle in theta:
                 row(material, (angle, phi))

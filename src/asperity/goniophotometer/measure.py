@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -231,8 +232,8 @@ def check_effort(incident: Sequence[Any], paths: float, tiles: int | None, seed:
     check_angles(incident)
     _check_whole("tiles", tiles, 2)
     _check_whole("seed", seed, 0)
-    if not 1 <= paths <= 1e13:  # nor NaN
-        raise ParameterError(f"paths = {paths:g}: expected a number in [1, 1e13].")
+    if not (isinstance(paths, Real) and 1 <= paths <= 1e13):  # nor NaN
+        raise ParameterError(f"paths = {paths!r}: expected a number in [1, 1e13].")
 
 
 def _check_whole(name: str, value: Any, least: int) -> None:
@@ -248,7 +249,7 @@ def _wavelengths(given: Sequence[float] | None) -> tuple[float, ...]:
         if given is not None:
             raise ParameterError(f"wavelengths: variant {mi.variant()} has none; use a spectral one.")
         return ()
-    chosen = tuple(float(w) for w in given or VISIBLE)
+    chosen = tuple(float(w) for w in (VISIBLE if given is None else given))
     channels = dr.size_v(mi.UnpolarizedSpectrum)
     if len(chosen) != channels or not all(360 <= w <= 830 for w in chosen):
         raise ParameterError(f"wavelengths = {chosen}: expected {channels} of them, in [360, 830] nm.")

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -119,9 +118,7 @@ def compare(a: mi.BSDF, b: mi.BSDF, names: Sequence[str] = ("a", "b")) -> Compar
 
     Raises ParameterError in variants without arrays, and if one, called by its name, is not finite.
     """
-    if not dr.is_jit_v(mi.Float):
-        variant = evaluate.active_variant()
-        raise ParameterError(f"variant {variant}: comparing needs one that computes on arrays, such as llvm_ad_rgb.")
+    evaluate.require_arrays("comparing")
     rings = np.degrees(np.arccos((np.arange(RINGS) + 0.5) / RINGS))[::-1]
     incident, outgoing = grid(rings, np.array(AZIMUTHS)), grid(*cells())
     wi, wo = (_directions(angles) for angles in (incident, outgoing))

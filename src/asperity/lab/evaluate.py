@@ -29,6 +29,13 @@ def active_variant() -> str:
     return str(mi.variant())
 
 
+def require_arrays(what: str) -> None:
+    """Raise ParameterError if the variant in use computes one number at a time, with which ``what`` cannot be done."""
+    variant = active_variant()
+    if not dr.is_jit_v(mi.Float):
+        raise ParameterError(f"variant {variant}: {what} needs one that computes on arrays, such as llvm_ad_rgb.")
+
+
 def load(description: dict[str, Any] | mi.BSDF) -> mi.BSDF:
     """Return the BSDF that a dictionary describes, or the BSDF itself if it is one already; raise ParameterError."""
     variant = active_variant()

@@ -108,5 +108,6 @@ def write_index(folder: str | Path) -> Path:
     """Write ``index.md``, of all pages that are there."""
     path = Path(folder) / "index.md"
     with atomically(path) as part:
-        part.write_text(page.index([model for model in PAPERS if path.with_name(f"{model}.md").exists()]))
+        models = [model for model in PAPERS if path.with_name(f"{model}.md").exists()]
+        part.write_text(page.index(models), encoding="utf-8")
     return path

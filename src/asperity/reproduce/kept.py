@@ -39,10 +39,10 @@ def stamp(effort: Effort) -> dict[str, Any]:
 
 @cache
 def code_digest() -> str:
-    """Of all code that numbers may depend on."""
+    """Of all code that numbers may depend on, and of the presets, textures and lights that renders do."""
     digest = sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        if not any(words in path.parents for words in WORDS):
+    for path in sorted(PACKAGE.rglob("*")):
+        if path.is_file() and path.suffix != ".pyc" and not any(words in path.parents for words in WORDS):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 

@@ -34,11 +34,21 @@ def features(scene: mi.Scene, sensor: int = 0, spp: int = 8, seed: int = 0) -> t
     Mitsuba's own AOV asks for the albedo at every sample, which is an integral for most models: slower than the whole
     picture. Here it is the mean weight of one sample of the BSDF each. It is grey outside of the RGB variants.
     """
+    # One sample after the other: of a large picture, all at once would take more memory than rendering it.
+    total = _seen(scene, sensor, seed)
+    for n in range(1, spp):
+        total += _seen(scene, sensor, seed + n)
+    albedo, normal = total / spp
+    return np.clip(albedo, 0, 1), normal
+
+
+def _seen(scene: mi.Scene, sensor: int, seed: int) -> Image:
+    """Albedo and normal (2, height, width, 3), of one sample a pixel."""
     camera = scene.sensors()[sensor]
     width, height = (int(n) for n in camera.film().crop_size())
     sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(seed, width * height * spp)
-    pixel = dr.arange(mi.UInt32, width * height * spp) // spp
+    sampler.seed(seed, width * height)
+    pixel = dr.arange(mi.UInt32, width * height)
     corner = mi.Point2f(mi.Float(pixel % width), mi.Float(pixel // width))
     place = (corner + sampler.next_2d()) / mi.Point2f(width, height)
     ray, _ = camera.sample_ray_differential(sampler.next_1d(), sampler.next_1d(), place, sampler.next_2d())
@@ -51,11 +61,7 @@ def features(scene: mi.Scene, sensor: int = 0, spp: int = 8, seed: int = 0) -> t
         values = mi.Color3f(dr.mean(values))
     albedo = dr.select(hit & (dr.isfinite(dr.sum(values))), mi.Color3f(values), 0)
     normal = dr.select(hit, si.sh_frame.n, 0)
-
-    def mean(array: Any) -> Image:
-        return np.array(array, dtype=np.float32).T.reshape(height, width, spp, 3).mean(axis=2)
-
-    return np.clip(mean(albedo), 0, 1), mean(normal)
+    return np.array([np.array(each, dtype=np.float32).T.reshape(height, width, 3) for each in (albedo, normal)])
 
 
 def denoised(image: NDArray[Any], albedo: Image, normal: Image) -> Image:

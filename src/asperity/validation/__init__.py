@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import UnknownNameError
+from ..lab import evaluate
 from . import interfacedlambertian, lambertsphere, micrograin, twoscale, vgroove
 from .report import FULL, QUICK, Effort, Report, Section
 
@@ -36,7 +37,11 @@ class StoppedError(Exception):
 
 
 def efforts(quick: bool, seed: int, stop: Callable[[], bool]) -> Effort:
-    """How long to measure; it ends by StoppedError as soon as ``stop()`` is true."""
+    """How long to measure; it ends by StoppedError as soon as ``stop()`` is true.
+
+    Raises ParameterError in variants without arrays.
+    """
+    evaluate.require_arrays("measuring")
 
     def tick(*_: object) -> None:
         if stop():

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
+from .. import files
 from ..files import atomically
 from ..goniophotometer import Estimate
 from ..version import __version__
@@ -129,7 +130,7 @@ class Report:
         self.finished = False
         self.path, self.seconds = folder / "report.md", 0.0
         self.start = time.perf_counter()
-        folder.mkdir(parents=True, exist_ok=True)  # now, not after minutes of tracing
+        files.folder(folder, "folder")  # now, not after minutes of tracing
 
     @property
     def passed(self) -> bool:

@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from ... import llvm, loading
+from .. import evaluate
 from .first import First, first_picture
 from .scenes import scenes
 from .timing import finish, quartiles, turns
@@ -24,6 +25,8 @@ from .timing import finish, quartiles, turns
 Description = dict[str, Any]
 Row = dict[str, Any]
 CALLS = "eval_pdf", "sample"
+LEAST = 1e-20
+"""What numbers that may be zero are divided by, at least: radiance of black materials, memory that nobody tells."""
 FRAMES = "bare", "preview", "filled", "point"
 
 
@@ -37,7 +40,7 @@ class Effort(NamedTuple):
     fresh: int
 
 
-FULL, QUICK = Effort(160, 16, 7, 1 << 21, 2), Effort(96, 8, 3, 1 << 19, 1)
+FULL, QUICK = Effort(160, 16, 5, 1 << 21, 2), Effort(96, 8, 3, 1 << 19, 1)
 
 
 def measure(
@@ -51,7 +54,9 @@ def measure(
     picture in a new process, and ``memory`` the most that it took, in MiB (``value`` and ``ratio``).
 
     ``tick(column)`` is called after each task; what it raises ends it.
+    Raises ParameterError in variants without arrays.
     """
+    evaluate.require_arrays("timing")
     reference = next(iter(materials))
     rows: dict[str, Row] = {name: {"against": reference} for name in materials}
     for column, tasks in calls(materials, effort.lanes).items():
@@ -65,7 +70,7 @@ def measure(
         spp = effort.spp * (4 if column == "bare" else 1)
         noise = {name: spp * relative_variance(pictures) for name, pictures in images.items()}
         for name, times in seconds.items():
-            ratio = noise[name] / noise[reference]
+            ratio = noise[name] / np.maximum(noise[reference], LEAST)
             rows[name][column] = timed(times, seconds[reference]) | {
                 "variance": quartiles(noise[name]),
                 "noise": quartiles(ratio),
@@ -79,7 +84,7 @@ def measure(
     for name in materials:
         (wall, _, memory), (wall_of, _, memory_of) = (np.array(firsts[one]).T for one in (name, reference))
         rows[name]["first"] = timed(wall, wall_of)
-        rows[name]["memory"] = {"value": quartiles(memory), "ratio": quartiles(memory / np.maximum(memory_of, 1e-9))}
+        rows[name]["memory"] = {"value": quartiles(memory), "ratio": quartiles(memory / np.maximum(memory_of, LEAST))}
     return rows
 
 
@@ -118,7 +123,9 @@ def frame(description: Description) -> Callable[[], Any]:
 def relative_variance(pictures: list[Any]) -> np.ndarray:
     """Of pictures of the same with other random numbers, by pairs of successive ones: variance over squared mean."""
     images = np.array([np.asarray(picture, dtype=float)[..., :3] for picture in pictures])
-    return np.square(np.diff(images, axis=0)).mean(axis=(1, 2, 3)) / 2 / np.square(images.mean(axis=0)).mean()
+    return (
+        np.square(np.diff(images, axis=0)).mean(axis=(1, 2, 3)) / 2 / max(np.square(images.mean(axis=0)).mean(), LEAST)
+    )
 
 
 def timed(times: np.ndarray, reference: np.ndarray) -> dict[str, list[float]]:

@@ -15,8 +15,11 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ...errors import ParameterError
 from ...scenes.preview import preview
 
+MATRIX = "asperity: matrix"
+"""The key of a transformation's rows, which JSON has no place for."""
 SIZE, SPP = 64, 4
 """Of the picture: nearly all of the time is tracing and compiling."""
 
@@ -36,20 +39,40 @@ def first_picture(material: dict[str, Any], variant: str) -> First:
         done = subprocess.run(
             [sys.executable, "-c", f"from {__package__} import first; first.main({variant!r})"],
             env=os.environ | {"HOME": home, "LOCALAPPDATA": home, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
-            input=json.dumps(material),
+            input=told(material),
             capture_output=True,
             text=True,
             check=False,
+            start_new_session=True,  # Ctrl-C is for whoever started it, and waits for the picture
         )
     if done.returncode:
         raise RuntimeError(f"no picture of {material.get('type')!r}: {done.stderr.strip()[-400:]}")
     return First(**json.loads(done.stdout.splitlines()[-1]))
 
 
-def here(material: dict[str, Any], variant: str) -> First:
+def told(material: dict[str, Any]) -> str:
+    """A description as JSON, transformations included; raises ParameterError if it holds other objects of Mitsuba's."""
+
+    def rows(value: Any) -> dict[str, Any]:
+        try:
+            return {MATRIX: [list(map(float, row)) for row in getattr(value, "matrix", value)]}
+        except TypeError:
+            raise ParameterError(f"a new process cannot be told of a {type(value).__name__}: name a file.") from None
+
+    return json.dumps(material, default=rows)
+
+
+def heard(text: str) -> dict[str, Any]:
+    """What was told."""
+    kinds = {3: mi.ScalarTransform3f, 4: mi.ScalarTransform4f}
+    return json.loads(text, object_hook=lambda node: kinds[len(node[MATRIX])](node[MATRIX]) if MATRIX in node else node)
+
+
+def here(text: str, variant: str) -> First:
     """In this process, which must be a new one."""
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
+    material = heard(text)
     wall, cpu = time.perf_counter(), time.process_time()
     scene = mi.load_dict(preview(material, size=(SIZE, SIZE), spp=SPP), parallel=False)
     dr.eval(mi.render(scene))
@@ -71,4 +94,4 @@ def most_memory() -> float:
 
 def main(variant: str) -> None:
     """What the new process does: from a description to numbers, as JSON."""
-    print(json.dumps(here(json.load(sys.stdin), variant)._asdict()))
+    print(json.dumps(here(sys.stdin.read(), variant)._asdict()))

@@ -31,8 +31,8 @@ PAPER = Paper(
             "and all bounces add little; neither plastic scatters back as the model does. One bounce takes the "
             "plastics' time, all bounces 30 to 60 % more.",
             "fig16",
-            f"{OUR_OBJECT} At σ 1.5 `roughplastic` is no brighter any more. Bounces take no random paths here: `asperity "
-            "bench interfacedlambertian` has the times.",
+            f"{OUR_OBJECT} At σ 1.5 `roughplastic` is no brighter any more. Bounces take no random paths here: "
+            "`asperity bench interfacedlambertian` has the times.",
         ),
         Result(
             "Fig. 7",
