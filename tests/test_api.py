@@ -277,7 +277,7 @@ BAD = {
     "object": (lambda: asp.render(GREY, object="pwan"), "Did you mean 'pawn'"),
     "view": (lambda: asp.plot(GREY, view="lobe"), "Did you mean 'lobes'"),
     "no view": (lambda: asp.plot(GREY, view=None), "unknown view None"),
-    "no angles": (lambda: asp.plot(GREY, theta=[]), r"theta = \[\]: expected a number, or a list"),
+    "no angles": (lambda: asp.plot(GREY, theta=[]), "theta: expected at least one number"),
     "words of angles": (lambda: asp.plot(GREY, theta="up"), "theta = 'up': expected a number, or a list"),
     "nothing": (lambda: asp.plot(), "expected at least one"),
     "option": (lambda: asp.plot(GREY, theta_i=[3]), "theta_i: makes no sense with view lobes"),

@@ -49,7 +49,7 @@ def test_all_that_describes_a_material(rgb, tmp_path):
 
 def test_names(rgb):
     gilded, diffuse = resolve("gilded"), resolve("diffuse")
-    assert gilded.description["type"] == "micrograin" and gilded.preview["object"] == "pawn"
+    assert gilded.description["type"] == "micrograin" and "object" in gilded.preview
     assert (diffuse.name, diffuse.description) == ("diffuse", {"type": "diffuse"})
     assert normal_value(diffuse) == pytest.approx(0.5 / np.pi, rel=1e-6)
 

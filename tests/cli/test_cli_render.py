@@ -210,7 +210,7 @@ def test_all_on_a_contact_sheet_goes_on_where_it_stopped(asperity, tmp_path, mon
     monkeypatch.setattr(mi, "render", interrupted)
     command = ("render", "--all", "--contact-sheet", "--size", "16", "--spp", "4")
     result = asperity(*command)
-    assert result.exit_code == 0 and "stopped early: 2 of 3 pictures" in result.output, result.output
+    assert result.exit_code == 1 and "stopped early: 2 of 3 pictures" in result.output, result.output
     assert files(tmp_path / "presets") == ["chalk.png", "gilded.png"]
     before = (tmp_path / "presets" / "chalk.png").stat().st_mtime_ns
     assert "presets/contact-sheet.png: 3 pictures" in asperity(*command).output

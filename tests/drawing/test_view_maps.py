@@ -110,3 +110,10 @@ def test_the_pdf_of_a_lambertian_is_that_of_the_cosine(rgb):
     wo = hemisphere.pixels()
     inside = wo[..., 2] > 0
     assert expected[inside] == pytest.approx(wo[inside][:, 2] / np.pi, abs=0.011 / np.pi)
+
+
+def test_what_is_marked_is_named_within_the_picture(rgb):
+    figure = plot([lambertian(0.8)], "hemisphere", theta=60)
+    figure.canvas.draw()
+    box = figure.axes[0].get_legend().get_window_extent()
+    assert box.x0 >= 0 and box.y0 >= 0

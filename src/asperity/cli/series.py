@@ -43,7 +43,7 @@ def write(
     sheet: bool,
     interrupted: Collection[Any],
 ) -> bool:
-    """Write NAME.png for each job, and perhaps a sheet of them; whether all pixels are sound.
+    """Write NAME.png for each job, and perhaps a sheet of them; whether all are there, and all pixels sound.
 
     Pictures that are there are kept, unless they are to be made ``again``. After an interruption the whole ones stay;
     ``paint`` says whether a picture is whole.
@@ -66,7 +66,7 @@ def write(
                 sound = False
         if interrupted:
             typer.echo(f"stopped early: {sum(file.exists() for file in files.values())} of {len(jobs)} pictures")
-            return sound
+            return False
     if sheet:
         from asperity.scenes.sheet import arranged
 

@@ -79,8 +79,10 @@ def _numbers(name: str, given: Any) -> list[float] | None:
         found = np.atleast_1d(np.asarray(given, dtype=float))
     except (TypeError, ValueError):
         found = np.zeros((0, 0))
-    if found.ndim != 1 or not found.size:
+    if found.ndim != 1:
         raise ParameterError(f"{name} = {short(given)}: expected a number, or a list of numbers.")
+    if not found.size:
+        raise ParameterError(f"{name}: expected at least one number.")
     return [float(number) for number in found]
 
 

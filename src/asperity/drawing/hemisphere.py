@@ -83,7 +83,7 @@ def bar(made: Figure, image: Any, grid: np.ndarray, label: str, **options: Any) 
 
 def name_marks(axes: Axes) -> None:
     """Say in the corner below a disc what is marked on it."""
-    place = {"loc": "lower left", "bbox_to_anchor": (0.0, -0.04)}
+    place = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.0)}
     named = axes.legend(**place, fontsize=5.5, handletextpad=-0.2, borderpad=0, labelspacing=0.2)
     named.set_in_layout(False)
 
