@@ -86,6 +86,8 @@ SWEEPS: dict[str, tuple[tuple[dict, str, tuple[float, ...]], ...]] = {
 """What a parameter does: a material, the parameter, and its values."""
 STRIP = ("dusty-wood", "verdigris", "gilded", "moldy-glass", "red-flock")
 STRIP += ("worn-copper", "polished-gold", "hematite", "corrugated-plastic", "lacquer-by-normal")
+VIEWS = {"dusty-wood": {"object": "ball", "floor": "tiles"}}
+"""Of presets in that picture, other than their own."""
 
 
 def table(model) -> str:
@@ -187,31 +189,53 @@ def kept_table() -> str:
     return "\n".join(lines)
 
 
-def shot(name: str, size: int, spp: int, finer: int = 1):
-    """A preset's preview, denoised, perhaps rendered ``finer`` than it is: `PIL.Image`."""
+def shot(material: dict, size: int, spp: int, finer: int = 1, **view: str):
+    """A material's preview, denoised, perhaps rendered ``finer`` than it is: `PIL.Image`."""
     import mitsuba as mi
     import numpy as np
     from PIL import Image
 
-    from asperity.scenes import denoise, presets
+    from asperity.scenes import denoise
     from asperity.scenes.preview import preview
 
     mi.set_variant("llvm_ad_rgb")
-    preset = presets.load(name)
-    scene = mi.load_dict(preview(preset.material, **preset.preview, size=(finer * size,) * 2), parallel=False)
+    scene = mi.load_dict(preview(material, **view, size=(finer * size,) * 2), parallel=False)
     image = denoise.denoised(np.array(mi.render(scene, spp=spp)), *denoise.features(scene))
     bitmap = mi.Bitmap(image).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, srgb_gamma=True)
     return Image.fromarray(np.array(bitmap)).resize((size, size), Image.Resampling.BOX)
 
 
-def strip(path: Path, size: int = 240, columns: int = 5, spp: int = 64) -> None:
-    """The presets of STRIP in rows."""
+def rows(shots: list, columns: int):
+    """Pictures of one size, row by row: `PIL.Image`."""
     from PIL import Image
 
-    whole = Image.new("RGB", (columns * size, -(-len(STRIP) // columns) * size))
-    for n, name in enumerate(STRIP):
-        whole.paste(shot(name, size, spp, finer=2), (n % columns * size, n // columns * size))
-    whole.save(path, optimize=True)
+    size = shots[0].width
+    whole = Image.new("RGB", (columns * size, -(-len(shots) // columns) * size))
+    for n, picture in enumerate(shots):
+        whole.paste(picture, (n % columns * size, n // columns * size))
+    return whole
+
+
+def strip(path: Path, size: int = 240, columns: int = 5, spp: int = 64) -> None:
+    """The presets of STRIP in rows."""
+    from asperity.scenes import presets
+
+    shots = []
+    for name in STRIP:
+        preset = presets.load(name)
+        shots.append(shot(preset.material, size, spp, 2, **preset.preview | VIEWS.get(name, {})))
+    rows(shots, columns).save(path, optimize=True)
+
+
+def moon(path: Path, size: int = 256, spp: int = 64) -> None:
+    """Lambert's law and d'Eon's dust of one reflectance, lit from behind the camera, and from the side."""
+    grey = {"reflectance": 0.45}
+    shots = [
+        shot({"type": name, **grey}, size, spp, object="ball", env="atelier", floor="tiles", light=light)
+        for light in ("front", "side")
+        for name in ("diffuse", "lambertsphere")
+    ]
+    rows(shots, len(shots)).save(path, optimize=True)
 
 
 def gallery(folder: Path, size: int = 256, spp: int = 16) -> None:
@@ -220,7 +244,8 @@ def gallery(folder: Path, size: int = 256, spp: int = 16) -> None:
 
     folder.mkdir(exist_ok=True)
     for name in presets.names():
-        shot(name, size, spp).save(folder / f"{name}.jpg", quality=88)
+        preset = presets.load(name)
+        shot(preset.material, size, spp, **preset.preview).save(folder / f"{name}.jpg", quality=88)
 
 
 def sweeps(name: str) -> str:
@@ -345,6 +370,7 @@ def main() -> None:
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         gallery(DOCS / "pictures" / "gallery")
+        moon(DOCS / "pictures" / "moon.png")
         figures(DOCS / "pictures")
         plots(DOCS / "pictures")
         draw_sweeps(DOCS / "pictures" / "sweeps")

@@ -64,7 +64,7 @@ def test_the_ball_has_flat_hollow_and_round_parts_and_a_chipped_edge():
     face = Rotation.from_matrix(BALL_POSE).apply([0, 0, 1])
     flat = np.einsum("vi,i->v", mesh.normals, face) > 0.99999
     height = mesh.vertices[flat] @ face
-    assert flat.sum() > 10_000 and np.quantile(height, 0.9) - np.quantile(height, 0.1) < 1e-3, "the flat ring"
+    assert flat.sum() > 5_000 and np.quantile(height, 0.9) - np.quantile(height, 0.1) < 1e-3, "the flat ring"
     upper = mesh.vertices[:, 2] > 0.6
     centre = np.array([0, 0, mesh.vertices[upper, 2].max() - BALL_RADIUS])
     outward = np.einsum("vi,vi->v", mesh.normals, mesh.vertices - centre)

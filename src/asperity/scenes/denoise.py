@@ -28,7 +28,7 @@ def require() -> None:
         raise ParameterError(f"--denoise: not in the variant {mi.variant()}; take one that starts with llvm or cuda.")
 
 
-def features(scene: mi.Scene, sensor: int = 0, spp: int = 16, seed: int = 0) -> tuple[Image, Image]:
+def features(scene: mi.Scene, sensor: int = 0, spp: int = 8, seed: int = 0) -> tuple[Image, Image]:
     """Albedo and normal (height, width, 3) of what a sensor sees first, which guide the denoiser; 0 where it sees none.
 
     Mitsuba's own AOV asks for the albedo at every sample, which is an integral for most models: slower than the whole

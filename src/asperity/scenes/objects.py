@@ -63,7 +63,7 @@ def pawn(columns: int = 512, rows: int = 400) -> ShadedMesh:
     return revolve(*smooth([*PAWN_PROFILE.values(), head], rows), columns)
 
 
-def ball(columns: int = 512, rows: int = 480) -> ShadedMesh:
+def ball(columns: int = 384, rows: int = 400) -> ShadedMesh:
     """A ball in the cup of a plinth: its face is a flat ring around a bowl with a pearl; u follows each turning."""
     angles = np.radians([178, 166, 154, 142, 130, 118, 106, 94, 84, 78])
     face = BALL_RADIUS * np.cos(BALL_FACE)
