@@ -46,6 +46,7 @@ BAD = [
     ((*RENDER, "--material", "null.json", "--preset", "gilded"), "exclude each other"),
     (("render", "--size", "0"), "'0': expected 512 or 640x360"),
     (("render", "--size", "12x"), "'12x': expected 512 or 640x360"),
+    (("render", "--size", "32768"), "'32768': expected 512 or 640x360"),
     (("render", "--spp", "0"), "--spp"),
     (("render", "--seed", "-1"), "--seed"),
     (("render", "-o", "none/out.png"), "cannot write into the folder 'none'"),

@@ -17,6 +17,8 @@ from . import channels, console, materials, output, passes, pictures, scene_file
 
 SIZE, SPP = (512, 512), 64
 """Of a preview: about 20 s of processor time from the prompt to the picture."""
+MOST = 2**27
+"""Pixels: sums of more do not fit into the memory of a desk."""
 
 VIEW = ("object", "env", "light", "floor", "crease")
 """Options that are arguments of `preview.preview`."""
@@ -37,8 +39,8 @@ def parse_size(text: str) -> tuple[int, int]:
     """Width and height from ``512`` or ``640x360``."""
     numbers = re.fullmatch(r"(\d+)(?:x(\d+))?", text)
     width, height = (int(numbers[1]), int(numbers[2] or numbers[1])) if numbers else (0, 0)
-    if not (0 < width <= 2**15 and 0 < height <= 2**15):
-        raise typer.BadParameter(f"{text!r}: expected 512 or 640x360, up to 32768.")
+    if not (0 < width <= 2**15 and 0 < height <= 2**15 and width * height <= MOST):
+        raise typer.BadParameter(f"{text!r}: expected 512 or 640x360, up to 32768, and {MOST:,} pixels.")
     return width, height
 
 
