@@ -4,8 +4,8 @@ The materials of a group take turns, so that all meet the same noise of the mach
 of times and of their ratios to the reference's in the same round.
 
 Every BSDF that is alive makes all frames longer, since Dr.Jit records all that a pointer may mean: fifty make that of
-`roughconductor` three times as long, the dozen of a group a tenth, and ratios come nearer to 1. So groups are small, and
-each scene is measured by itself.
+`roughconductor` three times as long, the dozen of a group a tenth, and ratios come nearer to 1. So groups are small,
+and each scene is measured by itself.
 """
 
 from __future__ import annotations
