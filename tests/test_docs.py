@@ -139,3 +139,16 @@ def test_the_model_in_contributing_works(rgb, monkeypatch):
     only = ("chi2", "weight", "reciprocity", "bounds", "energy", "gradients")
     found = checks.check({"type": "minnaert"}, only=only, significance=1e-4)
     assert [(result.name, result.measured) for result in found if not result.passed] == []
+
+
+def test_times_of_preview_frames_in_the_readme_are_those_of_the_benchmark():
+    """All lie in the range that it gives, or are named with a number of their own."""
+    readme = " ".join((ROOT / "README.md").read_text().split())
+    words = r"takes (\S+) to (\S+) times as long .*? diffuse grains (\S+), with coated .*? (\S+) to (\S+) times"
+    low, high, diffuse, least, most = map(float, re.search(words, readme).groups())
+    rows = json.loads(build.SPEED.read_text())["rows"]
+    ratios = {name: row["preview"]["ratio"][1] for name, row in rows.items() if row["against"] != name}
+    grains = ratios.pop("micrograin, diffuse grains")
+    slow = [ratios.pop(name) for name in ("micrograin, coated grains", "interfacedlambertian, anisotropic")]
+    assert (round(min(ratios.values()), 2), round(max(ratios.values()), 2)) == (low, high)
+    assert (round(grains, 1), round(min(slow), 1), round(max(slow), 1)) == (diffuse, least, most)
