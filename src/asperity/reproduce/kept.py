@@ -72,7 +72,8 @@ def read(file: Path) -> Kept | None:
         section = Section(given["title"], given["text"], findings, [Table(**table) for table in given["tables"]])
         kept = Kept(section, found["pictures"], found["stamp"], float(found["seconds"]))
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise UnreadableFileError("section", file, (".json of asperity reproduce",), str(error)) from error
+        reason = f"{error}; remove it, and it is made anew"
+        raise UnreadableFileError("section", file, (".json of asperity reproduce",), reason) from error
     return kept if all(file.with_name(f"{name}.png").is_file() for name in kept.pictures) else None
 
 
