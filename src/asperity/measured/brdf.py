@@ -32,7 +32,7 @@ class BRDF:
     errors: Array | None = None  # standard errors of the values, if they are known
     isotropic: bool = True
     source: str = ""
-    left_out: Mapping[str, int] = field(default_factory=dict)  # pairs that a file holds and this does not: why, how many
+    left_out: Mapping[str, int] = field(default_factory=dict)  # pairs in the file that are not here: why, how many
 
     def __post_init__(self) -> None:
         pairs = len(self.wi)
@@ -43,7 +43,9 @@ class BRDF:
             if numbers.shape != shape or not numbers.size:
                 raise ParameterError(f"{name} is of shape {numbers.shape}, not {shape}, or empty")
             if len(wrong := np.flatnonzero(~np.isfinite(numbers).all(axis=1))):
-                raise ParameterError(f"{name} is not finite in {len(wrong)} of {pairs} pairs, the first number {wrong[0]}")
+                raise ParameterError(
+                    f"{name} is not finite in {len(wrong)} of {pairs} pairs, the first number {wrong[0]}"
+                )
             object.__setattr__(self, name, numbers)
         for name in ("wi", "wo"):
             w = getattr(self, name)
