@@ -113,12 +113,8 @@ def test_what_is_damaged_is_refused_by_name(tmp_path, name):
 def test_what_is_no_file_is_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe.binary")
     (tmp_path / "folder.binary").mkdir()
-    for name, words in (
-        ("pipe", "no ordinary file"),
-        ("folder", "a folder"),
-        ("none", "no such file"),
-        ("x" * 999, "no such"),
-    ):
+    reasons = {"pipe": "no ordinary file", "folder": "a folder", "none": "no such file", "x" * 999: "no such file"}
+    for name, reason in reasons.items():
         with pytest.raises(UnreadableFileError, match=reason):
             merl.load(tmp_path / f"{name}.binary")
     with pytest.raises(UnreadableFileError, match="its ending is"):
