@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UnreadableFileError
-from . import archive, goniometer, merl
+from . import archive, goniometer, merl, rgl
 from .brdf import BRDF as BRDF
 from .brdf import from_measurement as from_measurement
 
-LOADERS = {format: module.load for module in (merl, goniometer, archive) for format in module.FORMATS}  # type: ignore[attr-defined]
+LOADERS = {format: module.load for module in (merl, rgl, goniometer, archive) for format in module.FORMATS}  # type: ignore[attr-defined]
 """What reads a file, by its ending."""
 
 
