@@ -2,8 +2,8 @@
 
 Values are those that Mitsuba's plugin ``measured`` has where the file has its own: for each direction of incidence, at
 the vertices of the table of ``spectra`` (or ``rgb``), which the plugin spreads over half vectors m by drawing them from
-the table ``vndf``; at θ_i = 0, which has no azimuth, elsewhere. In between the plugin interpolates; what is rendered agrees with what is read here. Values below 0
-are kept: they are noise, and in RGB colours that are more saturated than sRGB's.
+the table ``vndf``; at θ_i = 0, which has no azimuth, they lie elsewhere. In between the plugin interpolates; what is
+rendered agrees with what is read here. Values below 0, which published files have, are kept.
 """
 
 from __future__ import annotations
