@@ -11,6 +11,12 @@ from asperity.models.lambertsphere.transport import Directions
 N = 1 << 17
 
 
+def use(variant):
+    """Set the variant; the name of what then is active, since `--variant` may put another in its place."""
+    mi.set_variant(variant)
+    return mi.variant()
+
+
 def directions(rng, n, lowest=0.01):
     """Evenly over the hemisphere, in double precision (3, n)."""
     z, azimuth = rng.uniform(lowest, 1, n), rng.uniform(0, 2 * np.pi, n)

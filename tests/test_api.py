@@ -5,6 +5,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from helpers import use
 from matplotlib.text import Text
 
 import asperity as asp
@@ -69,7 +70,7 @@ def test_chunks_change_nothing(rgb, tmp_path):
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral", "scalar_rgb"])
 def test_wavelengths(variant):
     """As many as one likes, though the variant has four; and the variant stays."""
-    mi.set_variant(variant)
+    variant = use(variant)
     reflectance = 0.1 + 0.6 * (np.array(NM) - 400) / 300
     found = asp.evaluate(SLOPE, (0, 0), [[0, 0], [60, 0]], wavelengths=NM)
     assert found == pytest.approx(np.outer([1, 0.5], reflectance) / np.pi, rel=1e-5)
@@ -81,7 +82,7 @@ def test_wavelengths(variant):
 
 @pytest.mark.parametrize("variant, channels", [("scalar_rgb", 3), ("llvm_ad_mono", 1), ("llvm_ad_mono_polarized", 1)])
 def test_other_variants(variant, channels):
-    mi.set_variant(variant)
+    variant = use(variant)
     assert asp.evaluate(GREY, (0, 0), (0, 0)) == pytest.approx([0.25 / np.pi] * channels, rel=1e-6)
     assert mi.variant() == variant
 
@@ -180,13 +181,13 @@ def test_wavelengths_of_numpy(rgb):
 
 
 def test_a_spectrum_needs_no_spectral_variant(rgb):
-    assert asp.plot(SLOPE, view="spectrum", theta=[30]).axes and mi.variant() == "llvm_ad_rgb"
+    assert asp.plot(SLOPE, view="spectrum", theta=[30]).axes and mi.variant() == rgb
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_rgb"])
 def test_a_comparison(variant, tmp_path):
     """Twice the reflectance: 100 % brighter everywhere."""
-    mi.set_variant(variant)
+    variant = use(variant)
     found = asp.compare(GREY, {"type": "diffuse", "reflectance": 0.5})
     assert found.numbers["mean_relative_error"] == pytest.approx(1, rel=1e-6)
     assert found.found.albedo_difference == pytest.approx(np.full(18, 0.25), rel=1e-6)
@@ -254,7 +255,7 @@ BAD = {
     "many nm": (lambda: asp.sample(GREY, UP, 1, wavelengths=NM), "6 of them, and a sample has at most 4"),
     "variant": (
         lambda: asp.evaluate(evaluate.load(GREY), UP, UP, wavelengths=[500]),
-        "BSDF of variant llvm_ad_rgb, and llvm_ad_spectral is set",
+        "BSDF of variant [a-z]*_ad_rgb, and [a-z]*_ad_spectral is set",
     ),
     "check": (lambda: asp.check(GREY, ["enrgy"]), "Did you mean 'energy'"),
     "no check": (lambda: asp.check(GREY, []), "only: expected at least one check"),
@@ -296,10 +297,10 @@ def test_bad_input(rgb, tmp_path, monkeypatch, name):
     call, message = BAD[name]
     with pytest.raises(asp.AsperityError, match=message):
         call()
-    assert mi.variant() == "llvm_ad_rgb" and not list(tmp_path.iterdir())
+    assert mi.variant() == rgb and not list(tmp_path.iterdir())
 
 
 def test_a_spectral_variant_needs_wavelengths():
-    mi.set_variant("llvm_ad_spectral")
-    with pytest.raises(asp.ParameterError, match="wavelengths: variant llvm_ad_spectral needs them, in nm"):
+    variant = use("llvm_ad_spectral")
+    with pytest.raises(asp.ParameterError, match=f"wavelengths: variant {variant} needs them, in nm"):
         asp.evaluate(GREY, UP, UP)

@@ -3,6 +3,7 @@ import json
 import mitsuba as mi
 import numpy as np
 import pytest
+from helpers import use
 
 from asperity import materials
 from asperity.errors import AsperityError, ParameterError, UnknownNameError, UnreadableFileError
@@ -149,8 +150,8 @@ def test_bad_input(rgb, tmp_path, monkeypatch, name):
 
 def test_a_bsdf_of_another_variant(rgb):
     bsdf = resolve(evaluate.load(GREY))
-    mi.set_variant("llvm_ad_spectral")
-    with pytest.raises(ParameterError, match="is a BSDF of variant llvm_ad_rgb, and llvm_ad_spectral is set"):
+    other = use("llvm_ad_spectral")
+    with pytest.raises(ParameterError, match=f"is a BSDF of variant {rgb}, and {other} is set"):
         bsdf.load()
 
 

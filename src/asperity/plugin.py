@@ -12,7 +12,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from . import llvm, loading, threads
+from . import cuda, llvm, loading, threads
 from .microfacet.albedo import directional_albedo
 from .microfacet.quadrature import RULES, rule
 from .models import MODELS, PHASES, TEXTURES
@@ -23,6 +23,7 @@ def register() -> None:
     """Register every model in the active variant."""
     variant = mi.variant()
     llvm.guard(variant)
+    cuda.guard(variant)
     threads.ensure_worker()
     loading.PLUGINS.update(MODELS, TEXTURES, PHASES)
     for name, model in MODELS.items():

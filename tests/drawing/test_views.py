@@ -62,8 +62,8 @@ BAD = {
     "scale": ("lobes", {"scale": "logarithmic"}, UnknownNameError, "unknown scale.*Allowed: linear, log"),
     "channel": ("slices", {"channel": "X"}, UnknownNameError, "unknown channel 'X'.*mean, each, R, G, B"),
     "channels": ("hemisphere", {"channel": "each"}, ParameterError, "a map shows one channel"),
-    "wavelengths": ("slices", {"wavelengths": (500,)}, ParameterError, "variant llvm_ad_rgb has none"),
-    "spectrum": ("spectrum", {}, ParameterError, "variant llvm_ad_rgb: it has no spectra"),
+    "wavelengths": ("slices", {"wavelengths": (500,)}, ParameterError, "variant [a-z]*_ad_rgb has none"),
+    "spectrum": ("spectrum", {}, ParameterError, "variant [a-z]*_ad_rgb: it has no spectra"),
     "several": ("sampling", {"theta": (1, 2)}, ParameterError, "one angle of incidence; 2 were given"),
 }
 
@@ -128,7 +128,7 @@ def test_what_was_not_measured_is_not_drawn(rgb, measured):
     with pytest.raises(ParameterError, match="nothing was measured in the plane"):
         drawing.plot([aside], "slices")
     mi.set_variant("llvm_ad_spectral")
-    with pytest.raises(ParameterError, match=r"variant llvm_ad_spectral.*other channels there than measured.*R, G, B"):
+    with pytest.raises(ParameterError, match=r"variant .*_ad_spectral.*other channels there than measured.*R, G, B"):
         drawing.plot([measured, lambertian()], "slices")
 
 

@@ -30,10 +30,13 @@ def t_limit(numbers, tiles):
 @pytest.mark.filterwarnings("ignore:theta = 89.9")  # a furnace is white however often its tile repeats
 @pytest.mark.parametrize("theta", [0.0, 60.0, 89.9])
 def test_white_furnace_is_exact(theta):
-    # All facets return all light, and energy is counted in integers: not a unit may be missing.
+    # All facets return all light, and energy is counted in integers: not a unit may be missing. But a GPU's division,
+    # of which weights are made, is off by up to two roundings, 2.4e-7; few paths meet more than eight facets.
     measured = measure(ExplicitGrains(0.5, 1.5, 0.7, base=WHITE), [(theta, 10)], **FEW)
     every = measured.total_albedo.value + measured.cut.value
-    assert np.all(every == 1) and np.all(measured.transmitted.value == 0) and measured.cut.value.max() < 1e-4
+    rounding = 2e-6 if mi.variant().startswith("cuda") else 0
+    assert np.all(np.abs(every - 1) <= rounding)
+    assert np.all(measured.transmitted.value == 0) and measured.cut.value.max() < 1e-4
 
 
 def test_a_flat_mirror_sends_all_light_to_one_cell():

@@ -1,9 +1,9 @@
 """Pictures of measurements: what is drawn is named, and has the channels that were measured."""
 
 import asperity  # noqa: F401  isort: skip
-import mitsuba as mi
 import numpy as np
 import pytest
+from helpers import use
 
 from asperity.errors import ParameterError
 from asperity.goniophotometer import Hemisphere, Points, Window, measure, plots
@@ -36,7 +36,7 @@ def test_any_model_is_drawn_beside_what_was_measured(rgb, sensor):
 @pytest.mark.parametrize("variant", ["llvm_ad_spectral", "llvm_ad_mono"])
 def test_a_model_needs_the_channels_that_were_measured(rgb, variant):
     measured = seen()
-    mi.set_variant(variant)
+    variant = use(variant)
     with pytest.raises(ParameterError, match=f"variant {variant}.*R, G, B were measured"):
         plots.figure(measured, GREY)
 

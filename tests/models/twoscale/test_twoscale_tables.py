@@ -7,7 +7,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 import references
-from drjit.llvm.ad import Float
 from helpers import float64
 
 from asperity.lab import evaluate
@@ -27,8 +26,9 @@ def looked_up(alphas, p, b, c, cos_d, h):
     """(V, u) of three channels."""
     bands = Bands.of(CHANNELS.tolist())
     u = mi.UnpolarizedSpectrum(b * mi.Float(cos_d) / bands.at(None))
-    convolved = Convolved.of(Profile.of(Float(p)), [Float(alpha) for alpha in alphas], Float(b), Float(c), bands)
-    return np.array(convolved.at(Float(c), u, h)), np.array(u, dtype=float)
+    p, b, c, *alphas = map(mi.Float, (p, b, c, *alphas))
+    convolved = Convolved.of(Profile.of(p), alphas, b, c, bands)
+    return np.array(convolved.at(c, u, h)), np.array(u, dtype=float)
 
 
 def test_the_convolution(rgb):
