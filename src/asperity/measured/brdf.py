@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ class BRDF:
     errors: Array | None = None  # standard errors of the values, if they are known
     isotropic: bool = True
     source: str = ""
+    weights: Array | None = None  # (n,): dω_i dω_o that a pair stands for, up to a factor; None if all the same
     left_out: Mapping[str, int] = field(default_factory=dict)  # pairs in the file that are not here: why, how many
 
     def __post_init__(self) -> None:
@@ -55,11 +56,23 @@ class BRDF:
                 raise ParameterError(f"{name} holds directions that are not above the surface")
         if self.errors is not None and self.errors.min() < 0:
             raise ParameterError("errors has numbers below 0")
+        if self.weights is not None:
+            weights = np.asarray(self.weights, dtype=np.float64)
+            if weights.shape != (pairs,) or not (np.isfinite(weights) & (weights >= 0)).all() or not weights.any():
+                raise ParameterError(f"weights: expected {pairs} finite numbers, not below 0, and not all 0")
+            object.__setattr__(self, "weights", weights)
         if self.mode == "spectral" and len(set(self.wavelengths or ())) < len(self.channels):
             raise ParameterError(f"channels are {', '.join(self.channels)}: expected different wavelengths")
 
     def __len__(self) -> int:
         return len(self.wi)
+
+    def subset(self, index: NDArray[np.intp]) -> BRDF:
+        """Some of the pairs, by their numbers; what was ``left_out`` is that of the file."""
+        errors = None if self.errors is None else self.errors[index]
+        weights = None if self.weights is None else self.weights[index]
+        pairs = {"wi": self.wi[index], "wo": self.wo[index], "values": self.values[index]}
+        return replace(self, **pairs, errors=errors, weights=weights)
 
     @property
     def mode(self) -> str:
