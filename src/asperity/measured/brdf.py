@@ -32,8 +32,8 @@ class BRDF:
     errors: Array | None = None  # standard errors of the values, if they are known
     isotropic: bool = True
     source: str = ""
-    weights: Array | None = None  # (n,): dω_i dω_o that a pair stands for, up to a factor; None if all the same
     left_out: Mapping[str, int] = field(default_factory=dict)  # pairs in the file that are not here: why, how many
+    weights: Array | None = None  # (n,): dω_i dω_o that a pair stands for, up to a factor; None if all the same
 
     def __post_init__(self) -> None:
         pairs = len(self.wi)
