@@ -6,6 +6,7 @@
 """
 
 from .candidates import CANDIDATES as CANDIDATES
+from .data import data as data
 from .fit import fit as fit
 from .fit import rank as rank
 from .result import Fit as Fit

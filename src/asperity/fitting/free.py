@@ -14,7 +14,7 @@ from .. import loading
 from ..errors import ParameterError, suggestion
 from ..materials import changed
 from ..models import MODELS
-from ..parameters import Axes, Spectrum, Usual
+from ..parameters import Axes, Ior, Spectrum, Usual
 
 Array = NDArray[np.float64]
 Description = dict[str, Any]
@@ -36,7 +36,7 @@ MITSUBA: dict[str, dict[str, tuple[Usual, tuple[float, float], bool]]] = {
         "base_color": (SHARE, (0, 1), True),
         "roughness": (Usual(0.1, 1), (0.05, 1), False),
         "metallic": (SHARE, (0, 1), False),
-        "specular": (SHARE, (0.01, 1), False),
+        "specular": (Usual(0.01, 1), (0.01, 1), False),
         "spec_tint": (SHARE, (0, 1), False),
         "sheen": (SHARE, (0, 1), False),
         "sheen_tint": (SHARE, (0, 1), False),
@@ -47,10 +47,8 @@ MITSUBA: dict[str, dict[str, tuple[Usual, tuple[float, float], bool]]] = {
     "blendbsdf": {"weight": (SHARE, (0, 1), False)},
 }
 """Mitsuba's plugins do not declare what is usual: usual and allowed range, and whether it is a colour, by parameter."""
-DEFAULTS: dict[str, dict[str, float]] = {
-    "principled": {"sheen": 0.0, "clearcoat": 0.0, "spec_tint": 0.0, "sheen_tint": 0.0, "flatness": 0.0}
-    | {"clearcoat_gloss": 0.0}
-}
+DENSER = 1.001
+"""Than air: indices of refraction of what is measured."""
 NEVER = ("ext_ior",)
 """Of two indices of refraction only the ratio matters."""
 ASKED = ("wavelengths", "variation_azimuth", "clearcoat_gloss", "sheen_tint", "spec_tint", "flatness", "sheen")
@@ -128,6 +126,7 @@ def _declared(node: Description, isotropic: bool) -> Iterator[Free]:
             # Where derivatives are infinite at an end, or a factor would not do, the end itself is left out.
             steep = getattr(parameter, "steep", False)
             low = max(low, 1e-4) if usual[name].logarithmic else low
+            low = max(low, DENSER) if isinstance(parameter, Ior) else low
             colour = isinstance(parameter, Spectrum) or parameter.kind == "conductor"
             yield Free(name, usual[name], low, high - inner * steep, colour, _start(node.get(name)))
 

@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from .. import drawing
+from ..drawing import residuals
 from ..files import atomically
 from ..measured import BRDF
 from . import losses
@@ -92,7 +95,7 @@ class Fit:
         return [one.name for one in self.parameters if one.remark.startswith("not determined")]
 
     @property
-    def residuals(self) -> Array:
+    def differences(self) -> Array:
         """Of ln(1 + f cosθ_o), model less data (channels, n)."""
         return losses.log1p(self.values) - losses.log1p((self.data.values * self.data.wo[:, 2:]).T)
 
@@ -128,11 +131,10 @@ class Fit:
         with atomically(Path(path)) as part:
             part.write_text(json.dumps(content | {"fit": self.numbers()}, indent=2) + "\n", encoding="utf-8")
 
-    def plot(self) -> Any:
-        """A figure: residuals over θ_h and θ_d, and model beside data."""
-        from ..drawing import residuals
-
-        return residuals.figure(self)
+    def plot(self) -> Figure:
+        """A figure: data, model, and their difference over θ_h and θ_d."""
+        with drawing.style.applied():
+            return residuals.figure(self.name, self.data, self.values)
 
 
 def _finite(value: float) -> float | None:

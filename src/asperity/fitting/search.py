@@ -112,7 +112,8 @@ def search(problem: Problem, seed: int, robust: str, progress: Progress) -> bool
         for k in order:
             found.append(follow(first[k], STEPS, width))
             done = max(done, len(first) + STEPS * len(found))
-        problem.best = follow(min(found, key=lambda one: one.cost).x, LAST, width).x
+        best = min(found, key=lambda one: one.cost).x
+        problem.best = follow(best, LAST, _width(problem, best, robust)).x
     except KeyboardInterrupt:
         if problem.best is None:
             raise
