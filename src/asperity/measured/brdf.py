@@ -71,8 +71,8 @@ class BRDF:
         """Some of the pairs, by their numbers; what was ``left_out`` is that of the file."""
         errors = None if self.errors is None else self.errors[index]
         weights = None if self.weights is None else self.weights[index]
-        pairs = {"wi": self.wi[index], "wo": self.wo[index], "values": self.values[index]}
-        return replace(self, **pairs, errors=errors, weights=weights)
+        wi, wo, values = self.wi[index], self.wo[index], self.values[index]
+        return replace(self, wi=wi, wo=wo, values=values, errors=errors, weights=weights)
 
     @property
     def mode(self) -> str:
