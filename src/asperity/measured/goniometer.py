@@ -101,7 +101,8 @@ def load(
 def save(brdf: BRDF, path: str | Path) -> None:
     """Write a table: angles in degrees, a column a channel, ``error ...`` columns if errors are known.
 
-    Pairs of an isotropic BRDF are turned until φ_i = 0, which is how a reader knows.
+    Pairs of an isotropic BRDF are turned until φ_i = 0, which is how a reader knows. Angles get eleven digits: the half
+    vectors of MERL's grid, from 0.01 degrees on, are differences of them.
     """
     header = [f"{name} [deg]" for name in ANGLES] + list(brdf.channels)
     incident, outgoing = brdf.incident, brdf.outgoing
@@ -113,7 +114,8 @@ def save(brdf: BRDF, path: str | Path) -> None:
         header += [f"error {name}" for name in brdf.channels]
         numbers.append(brdf.errors)
     with atomically(Path(path)) as part:
-        np.savetxt(part, np.concatenate(numbers, axis=1), "%.9g", ",", header=",".join(header), comments="")
+        digits = ["%.11g"] * len(ANGLES) + ["%.9g"] * (len(header) - len(ANGLES))
+        np.savetxt(part, np.concatenate(numbers, axis=1), digits, ",", header=",".join(header), comments="")
 
 
 def _read(path: Path) -> _Table:

@@ -168,10 +168,10 @@ def interpolate(table: Array, wi: Array, wo: Array) -> Array:
 def counts(brdf: BRDF) -> tuple[int, int, int] | None:
     """The counts of the grid that pairs seem to be nodes of, by the last ones; None if they are of none.
 
-    At θ_d = 0 or θ_h = 0, half vectors of all θ_h, and all θ_d, φ_d, have a value.
+    The last θ_h is that of a pair wi = wo, the others those of pairs about the normal, all of them above the surface.
     """
     theta_h, theta_d, phi_d = np.moveaxis(coordinates(brdf.wi, brdf.wo, (1, 1, 1)), -1, 0)
-    tilted = theta_d > NEAR
+    tilted = (theta_d > NEAR) & (theta_h > NEAR)  # elsewhere φ_d has no meaning
     if not brdf.isotropic or not tilted.any():
         return None
     last = np.array([theta_h.max(), theta_d.max(), phi_d[tilted & (phi_d < 1 - NEAR**2)].max(initial=0)])
@@ -189,11 +189,14 @@ def table(brdf: BRDF, counts: tuple[int, int, int] = COUNTS) -> Array | None:
     index = np.round(place).astype(int)
     off = np.abs(place - index)
     index[:, 2] %= counts[2]
-    off[index[:, 1] == 0, 2] = 0
+    off[(index[:, :2] == 0).any(axis=1), 2] = 0  # there φ_d has no meaning
     if off.max() > NEAR or (index[:, :2] >= counts[:2]).any():
         return None
     found = np.full((*counts, len(brdf.channels)), np.nan)
     found[tuple(index.T)] = brdf.values
     same = index[:, 1] == 0
     found[index[same, 0], 0] = brdf.values[same, None]
+    straight, known = found[0], np.isfinite(found[0])
+    mean = np.where(known, straight, 0).sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
+    found[0] = np.where(~known & known.any(axis=1, keepdims=True), mean, straight)
     return found
