@@ -75,7 +75,7 @@ def convert(
     if resolution is not None:
         whole("resolution", resolution, 4, MOST)
     kept = pairs if resolution is None else None
-    steps = resolution or (RESOLUTIONS if f.isotropic else RESOLUTIONS | ANISOTROPIC)[ending]
+    steps = resolution or _steps(f, ending)
     if ending == ".bsdf":
         return _checked(f, table(f, path, steps, progress), path)
     progress("writing", 0, 2)
@@ -127,7 +127,16 @@ def _grid(kept: BRDF | None, f: Function, steps: int) -> Array:
     return np.broadcast_to(values, (*counts, 3))
 
 
-def table(f: Function, path: str | Path, steps: int = 90, progress: Progress = lambda *_: None) -> Function:
+def _steps(f: Function, ending: str) -> int:
+    """The resolution that there is by default; tables of scattered pairs need no more than these resolve."""
+    steps = (RESOLUTIONS if f.isotropic else RESOLUTIONS | ANISOTROPIC)[ending]
+    if ending != ".bsdf" or not isinstance(f.f, functions.Scattered):
+        return steps
+    finest = 5 * len(f.f.values) ** (1 / 3) if f.isotropic else 2 * len(f.f.values) ** (1 / 4)
+    return int(np.clip(finest, 12, steps))
+
+
+def table(f: Function, path: str | Path, steps: int | None = None, progress: Progress = lambda *_: None) -> Function:
     """Write the table of Mitsuba's plugin ``measured``, and give back the function that the plugin has.
 
     Raises ParameterError if the active variant has other channels.
@@ -136,6 +145,7 @@ def table(f: Function, path: str | Path, steps: int = 90, progress: Progress = l
     from ..lab import evaluate
 
     _check_variant(f)
+    steps = steps or _steps(f, ".bsdf")
     theta = [*np.linspace(0, LAST - 1, max(steps // 2, 4)), LAST]
     phi = [0.0] if f.isotropic else list(np.arange(-180.0, 180, 22.5))
     tensor_file.tabulate(
