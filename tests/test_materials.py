@@ -132,6 +132,14 @@ def test_measured_pairs_at_wavelengths_need_a_variant_with_them(rgb):
         material.load()
 
 
+@pytest.mark.parametrize("description", [{"type": "measured"}, {"type": "measured", "filename": "none.bsdf"}])
+def test_a_measurement_without_its_file_is_refused_when_it_is_loaded(rgb, description):
+    material = resolve(description)
+    assert material.mode == "" and material.wavelengths is None
+    with pytest.raises(ParameterError, match="filename"):
+        material.load()
+
+
 BAD = {
     "nonexistent": ("glided", UnknownNameError, "unknown material 'glided'. Did you mean 'gilded'? Tried: presets, "),
     "a model's name": ("micrograim", UnknownNameError, "Did you mean 'micrograin'?"),

@@ -65,26 +65,20 @@ class Material:
     @property
     def mode(self) -> str:
         """The kind of Mitsuba's variants that have its channels: ``rgb``, ``mono`` or ``spectral``; empty if all do."""
-        from . import loading
-
         if self.measured is not None:
             return self.measured.mode
         if self.brdf is not None:  # Mitsuba renders tables of one channel in RGB only
             return "spectral" if self.brdf.wavelengths else "rgb"
-        if self.description is not None and self.description.get("type") == "measured":
-            return "rgb" if "rgb" in loading.tensors(Path(self.description["filename"])) else "spectral"
-        return ""
+        fields = self._tensors("measured")
+        return "" if not fields else "rgb" if "rgb" in fields else "spectral"
 
     @property
     def wavelengths(self) -> list[float] | None:
         """In nm, of the channels of a measurement; None in RGB, and of what has none of its own."""
-        from . import loading
-
         if self.measured is not None or self.brdf is not None:
             return (self.measured or self.brdf).wavelengths  # type: ignore[union-attr]
-        if self.mode == "spectral" and self.description is not None:
-            return [float(nm) for nm in loading.tensors(Path(self.description["filename"]))["wavelengths"]]
-        return None
+        found = self._tensors("measured").get("wavelengths")
+        return None if found is None else [float(nm) for nm in found]
 
     @property
     def pairs(self) -> BRDF | None:
@@ -116,17 +110,24 @@ class Material:
         """The range of θi, in degrees, that was measured; beyond it Mitsuba would repeat the last values."""
         import numpy as np
 
-        from . import loading
-
         if self.measured is not None:
             theta = self.measured.incident[:, 0]
         elif self.brdf is not None:  # by reciprocity
             theta = np.array([0, max(self.brdf.incident[:, 0].max(), self.brdf.outgoing[:, 0].max())])
-        elif self.description is not None and self.description.get("type") in TENSORS.values():
-            theta = np.degrees(loading.tensors(Path(self.description["filename"]))["theta_i"])
+        elif fields := self._tensors(*TENSORS.values()):
+            theta = np.degrees(fields["theta_i"])
         else:
             return ABOVE
         return float(theta.min()), float(theta.max())
+
+    def _tensors(self, *plugins: str) -> dict[str, Any]:
+        """What is in the file of one of Mitsuba's plugins for measurements; nothing of another material."""
+        from . import loading
+
+        given = self.description or {}
+        file = given.get("filename")
+        readable = given.get("type") in plugins and isinstance(file, str) and os.path.isfile(file)
+        return loading.tensors(Path(str(file))) if readable else {}
 
     def load(self) -> Any:
         """The ``mi.BSDF`` of the active variant; raises ParameterError if there is none.
