@@ -19,6 +19,7 @@ import numpy as np
 from asperity import loading
 from asperity.goniophotometer import Hemisphere, Measurement, measure
 from asperity.goniophotometer.mesh import HeightField
+from asperity.materials import resolve
 from asperity.measured import BRDF, archive, conversion, goniometer, load
 from asperity.measured.functions import Function, of_brdf, random_pairs
 from asperity.scenes import meshes, presets
@@ -71,6 +72,7 @@ def write_measured(folder: Path) -> None:
     f = Function(lambda wi, wo: 0.1 + wi * wo, ("R", "G", "B"))
     for ending in (".binary", ".bsdf"):
         conversion.convert(f, folder / f"grid{ending}", resolution=4)
+    (folder / "rendered.bsdf").write_bytes((folder / "grid.bsdf").read_bytes())
 
 
 def damaged_measurement(name: str, content: bytes, random: np.random.Generator) -> bytes:
@@ -171,7 +173,10 @@ def interpolated(path: Path) -> list[float]:
     return [float(x) for x in of_brdf(data)(*random_pairs(20)).ravel()]
 
 
-MEASURED = dict.fromkeys(("grid.binary", "grid.bsdf", "pairs.csv", "pairs.npz"), interpolated)
+MEASURED: dict[str, Callable[[Path], Any]] = {
+    **dict.fromkeys(("grid.binary", "grid.bsdf", "pairs.csv", "pairs.npz"), interpolated),
+    "rendered.bsdf": lambda path: looked_at(resolve(path).load()),
+}
 """The same for files of measured BRDFs."""
 READERS: dict[str, Callable[[Path], Any]] = {
     "full.ply": lambda path: show(meshes.to_mitsuba(meshes.from_file(path), {"type": "diffuse"})),

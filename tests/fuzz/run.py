@@ -1,6 +1,6 @@
 """Random descriptions of materials and damaged files, tried in child processes that are watched.
 
-    python tests/fuzz/run.py --count 10000 --files 2000 --measured 40000 --seed 1
+    python tests/fuzz/run.py --count 10000 --files 2000 --measured 50000 --seed 1
 
 Nothing may crash, hang, accept what is flawed, give values that are not finite or negative, or complain obscurely.
 What does is listed with the command that repeats it; the exit status is then 1.

@@ -66,6 +66,8 @@ def _checked(fields: dict[str, Any]) -> tuple[str, ...]:
     if missing := [one for one in needed if one not in fields]:
         raise ParameterError(f"its {missing[0]!r} is missing")
     dimensions = {"phi_i": 1, "theta_i": 1, "wavelengths": 1, "sigma": 2, "ndf": 2, "vndf": 4, "luminance": 4, name: 5}
+    if fields["jacobian"].shape != (1,) or fields["jacobian"].dtype != np.uint8:
+        raise ParameterError(f"its 'jacobian' is of shape {fields['jacobian'].shape}, not one byte")
     for one, count in dimensions.items():
         if one in needed and (fields[one].ndim != count or not fields[one].size or fields[one].dtype != np.float32):
             raise ParameterError(f"its {one!r} is of shape {fields[one].shape} and type {fields[one].dtype}")
