@@ -224,7 +224,6 @@ def _from_file(path: Path) -> Material:
 
     if os.path.isdir(path):
         raise UnreadableFileError("material", path, FORMATS, "it is a folder")
-    readable("material", path, FORMATS)
     ending = path.suffix.lower()
     if ending in PAIRS:
         from . import measured
@@ -233,6 +232,7 @@ def _from_file(path: Path) -> Material:
         if ending == ".npz" and not measured.archive.is_brdf(path):
             return Material(path.stem, measured=Measurement.load(path))
         return Material(path.stem, brdf=measured.load(path))
+    readable("material", path, FORMATS)
     if ending in TENSORS:
         description = {"type": TENSORS[ending], "filename": str(path.resolve())}
         loading.check(description)

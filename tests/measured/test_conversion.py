@@ -7,6 +7,7 @@ import pytest
 from data import SMALL, glossy, merl_file
 from test_functions import RGB, streak
 
+from asperity import loading
 from asperity.errors import ParameterError
 from asperity.lab import evaluate
 from asperity.materials import resolve
@@ -85,10 +86,14 @@ def test_a_channel_of_its_own_is_grey_and_wavelengths_are_refused_where_there_ar
 
 
 def test_wavelengths_become_a_spectral_table(tmp_path):
+    """As pbrt-v4 wants it, too: square tables of `spectra`, and no others."""
     mi.set_variant("llvm_ad_spectral")
     waves = Function(lambda wi, wo: glossy(wi, wo)[:, [0, 1, 2, 0, 1]], tuple(f"{nm} nm" for nm in range(450, 700, 50)))
     assert convert(waves, tmp_path / "x.bsdf", resolution=30).relative[0] < 0.01
     found = resolve(tmp_path / "x.bsdf")
+    fields = loading.tensors(tmp_path / "x.bsdf")
+    assert fields["spectra"].shape == (1, len(fields["theta_i"]), 5, 31, 31) and "rgb" not in fields
+    assert fields["luminance"].shape[2:] == (31, 31) and fields["jacobian"].shape == (1,)
     assert found.mode == "spectral" and found.wavelengths == [450, 500, 550, 600, 650]
 
 
