@@ -124,6 +124,21 @@ def test_a_measurement_has_values_where_it_was_measured(rgb, measured, tmp_path)
         asp.evaluate(measured, (40, 0), (30, 90), wavelengths=[500])
 
 
+def test_measured_pairs_become_any_file_and_have_values_in_their_channels(rgb, tmp_path):
+    """A measurement at wavelengths is answered in a spectral variant; tables of scattered pairs are 2% off at most."""
+    wavelengths, seen = [450, 550, 600, 650, 700], []
+    told = asp.convert(
+        GREY, tmp_path / "a.csv", wavelengths=wavelengths, resolution=10, progress=lambda *x: seen.append(x)
+    )
+    assert told.relative[2] < 1e-5 and seen == [("writing", 0, 2), ("checking", 1, 2)]
+    found = asp.evaluate(tmp_path / "a.csv", (40, 0), [(30, 90), (60, 10)])
+    cosines = np.cos(np.radians([[30], [60]]))
+    assert found.shape == (2, 5) and found == pytest.approx(0.25 / np.pi * cosines * np.ones(5), rel=0.02)
+    assert mi.variant() == "llvm_ad_rgb"
+    with pytest.raises(asp.ParameterError, match="has its own channels"):
+        asp.convert(tmp_path / "a.csv", tmp_path / "b.npz", wavelengths=[500])
+
+
 def test_what_is_measured(rgb, tmp_path):
     (tmp_path / "flat.obj").write_text(TRIANGLES)
     effort = {"paths": 1000, "tiles": 2, "sensor": Hemisphere(2, 4)}

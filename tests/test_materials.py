@@ -10,6 +10,9 @@ from asperity.errors import AsperityError, ParameterError, UnknownNameError, Unr
 from asperity.goniophotometer import HeightField, Hemisphere, measure
 from asperity.lab import evaluate
 from asperity.materials import resolve
+from asperity.measured import BRDF, convert
+from asperity.measured import load as measured_load
+from asperity.measured.functions import Function
 
 GREY = {"type": "diffuse", "reflectance": 0.25}
 XML = '<bsdf version="3.0.0" type="diffuse"><spectrum name="reflectance" value="0.25"/></bsdf>'
@@ -106,6 +109,36 @@ def test_a_measurement(rgb, measured, tmp_path):
 
     tensor_file.write(measured, tmp_path / "flat.bsdf")
     assert normal_value(resolve(tmp_path / "flat.bsdf")) == pytest.approx(normal_value(resolve(measured)), rel=1e-6)
+
+
+@pytest.mark.parametrize("ending", [".binary", ".csv", ".npz"])
+def test_measured_pairs(rgb, tmp_path, ending):
+    """A constant 0.25; the table is f cosθ_i cosθ_o, linear in between θ_i that are some degrees apart."""
+    f = Function(lambda wi, wo: np.full((len(wi), 3), 0.25), ("R", "G", "B"))
+    path = tmp_path / f"flat{ending}"
+    convert(f, path, resolution=10)
+    for what in (path, str(path), measured_load(path)):
+        material = resolve(what)
+        assert material.brdf is not None and material.mode == "rgb" and 85 < material.incidence[1] < 90
+        assert normal_value(material) == pytest.approx(0.25, rel=1e-3)
+    with pytest.raises(ParameterError, match="this is a measurement"):
+        resolve(path, {"alpha": 1})
+
+
+def test_measured_pairs_at_wavelengths_need_a_variant_with_them(rgb):
+    wi = np.array([[0, 0, 1.0], [0.6, 0, 0.8]])
+    material = resolve(BRDF(wi, wi, np.full((2, 2), 0.25), ("450 nm", "550 nm"), source="a lab"))
+    assert material.name == "a lab" and material.mode == "spectral" and material.wavelengths == [450, 550]
+    with pytest.raises(ParameterError, match="such as llvm_ad_spectral"):
+        material.load()
+
+
+@pytest.mark.parametrize("description", [{"type": "measured"}, {"type": "measured", "filename": "none.bsdf"}])
+def test_a_measurement_without_its_file_is_refused_when_it_is_loaded(rgb, description):
+    material = resolve(description)
+    assert material.mode == "" and material.wavelengths is None
+    with pytest.raises(ParameterError, match="filename"):
+        material.load()
 
 
 BAD = {

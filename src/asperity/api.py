@@ -27,7 +27,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from . import drawing, fitting, goniophotometer, loading, models, plugin, validation, variants
+from . import drawing, fitting, goniophotometer, loading, measured, models, plugin, validation, variants
 from .arrays import CHUNK, Array, Directions, mapped
 from .drawing import comparison
 from .errors import ParameterError, listed, refuse_unknown, refuse_unused, whole
@@ -35,6 +35,7 @@ from .goniophotometer.mesh import MESHES
 from .lab import checks
 from .lab import evaluate as lab
 from .materials import ABOVE, Material, resolve
+from .measured.conversion import Converted
 from .parameters import Declared
 from .results import Checks, Compared, Picture, Samples
 from .scenes import presets as _presets
@@ -279,6 +280,25 @@ def fit(data: Any, model: Any = "all", **options: Any) -> fitting.Fit | list[fit
     return fitting.rank(found, **options) if model == "all" else fitting.fit(found, model, **options)
 
 
+def convert(
+    material: Any,
+    path: str | Path,
+    *,
+    wavelengths: Sequence[float] | None = None,
+    resolution: int | None = None,
+    progress: Callable[[str, int, int], None] = lambda name, done, total: None,
+) -> Converted:
+    """Write any material as .binary (MERL), .bsdf (RGL, Mitsuba), .csv or .npz, and say how far off what is read is.
+
+    ``wavelengths``, in nm, tabulate a model in a spectral variant; ``resolution`` is that of `measured.convert`.
+    Whatever is at ``path`` is overwritten.
+    """
+    found = resolve(material)
+    with variants.switched(variants.of_bsdf(found, wavelengths is not None)):
+        f = found.function(None if wavelengths is None else _wavelengths(wavelengths, 0))
+        return measured.convert(f, path, found.pairs, resolution=resolution, progress=progress)
+
+
 def presets() -> dict[str, Material]:
     """All presets by name, each a `Material`: its ``description`` is a dictionary for ``mi.load_dict``."""
     return {name: resolve(name) for name in _presets.names()}
@@ -340,12 +360,12 @@ class _Loaded(NamedTuple):
 def _loaded(material: Any, wavelengths: Sequence[float] | None = None, colourless: bool = False) -> Iterator[_Loaded]:
     """The material, loaded in a variant that computes arrays, and wavelengths if they are asked for.
 
-    In a spectral variant these have to be, unless what is asked for is ``colourless``.
+    In a spectral variant these have to be, unless it has been measured at some, or what is asked for is ``colourless``.
     """
     found = resolve(material)
-    with variants.switched(variants.of_arrays(wavelengths is not None)):
+    with variants.switched(variants.of_bsdf(found, wavelengths is not None)):
         channels = dr.size_v(mi.UnpolarizedSpectrum)
-        chosen = _wavelengths(wavelengths, channels if colourless else 0)
+        chosen = _wavelengths(found.wavelengths if wavelengths is None else wavelengths, channels if colourless else 0)
         groups: list[Any] = [_filled(chosen[k : k + channels], channels) for k in range(0, len(chosen), channels)]
         yield _Loaded(found.name, found.load(), groups or [None], len(chosen) or channels, found.incidence)
 

@@ -70,6 +70,7 @@ NESTING = ("checkerboard", "settled")
 
 TRACEBACK = "Traceback (most recent call last):\n"
 NOISE = {
+    r"\[Measured\] Invalid file structure.*": "its tables do not go together.",
     r"\[parser\.cpp:\d+\] \[(?!\w+\.cpp)([\w.]+)\] ": r"\1: ",
     r"\[\w+(?:\.\w+:\d+)?\] ": "",
     r'(?:At|While loading) dictionary node "root": ': "",

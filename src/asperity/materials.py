@@ -3,9 +3,10 @@
 A material is one of:
 
 - the name of a preset, ``gilded``, or of a model or a Mitsuba plugin, ``roughplastic``, with its default parameters;
-- a file: a description in JSON, or Mitsuba's XML; a measurement, ``.npz`` of ours or ``.bsdf`` of RGL's;
+- a file: a description in JSON, or Mitsuba's XML; a measurement, ``.npz`` of ours, ``.bsdf`` of RGL's, ``.binary`` of
+  MERL's, or a goniometer's ``.csv``;
 - a text, the JSON or XML itself;
-- in Python, also a dictionary, a `Measurement`, or a loaded ``mi.BSDF``.
+- in Python, also a dictionary, a `Measurement`, a `measured.BRDF`, or a loaded ``mi.BSDF``.
 
 Commands import this before they run, so that it imports nothing heavy itself.
 """
@@ -16,7 +17,7 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,12 +27,18 @@ from .scenes import presets
 
 if TYPE_CHECKING:
     from .goniophotometer import Measurement
+    from .measured import BRDF
+    from .measured.functions import Function
 
 Description = dict[str, Any]
 
 TENSORS = {".bsdf": "measured", ".pbsdf": "measured_polarized"}
 """Mitsuba's plugins for measurements, by the endings of their files."""
-FORMATS = (".json", ".xml", ".npz", *TENSORS)
+PAIRS = (".npz", ".binary", ".csv")
+"""Endings of files that hold measured values in pairs of directions."""
+FORMATS = (".json", ".xml", *PAIRS, *TENSORS)
+WAVELENGTHS = [float(nm) for nm in range(400, 701, 20)]
+"""In nm, at which a BSDF is tabulated in spectral variants, if none are asked for."""
 ABOVE = (0.0, 90.0)
 """θ, in degrees, of all directions above a surface."""
 TRIED = (
@@ -44,6 +51,7 @@ TRIED = (
 class Material:
     """A material under its name: a description, or else a BSDF that is loaded already, or a measurement.
 
+    What the virtual goniophotometer ``measured`` has cells, and noise; a ``brdf`` is values in pairs of directions.
     ``preview`` holds arguments of `scenes.preview.preview`, which say how to look at it.
     """
 
@@ -52,26 +60,80 @@ class Material:
     bsdf: Any = None
     preview: dict[str, Any] = field(default_factory=dict)
     measured: Measurement | None = None
+    brdf: BRDF | None = None
+
+    @property
+    def mode(self) -> str:
+        """The kind of Mitsuba's variants that have its channels: ``rgb``, ``mono`` or ``spectral``; empty if all do."""
+        if self.measured is not None:
+            return self.measured.mode
+        if self.brdf is not None:  # Mitsuba renders tables of one channel in RGB only
+            return "spectral" if self.brdf.wavelengths else "rgb"
+        fields = self._tensors("measured")
+        return "" if not fields else "rgb" if "rgb" in fields else "spectral"
+
+    @property
+    def wavelengths(self) -> list[float] | None:
+        """In nm, of the channels of a measurement; None in RGB, and of what has none of its own."""
+        if self.measured is not None or self.brdf is not None:
+            return (self.measured or self.brdf).wavelengths  # type: ignore[union-attr]
+        found = self._tensors("measured").get("wavelengths")
+        return None if found is None else [float(nm) for nm in found]
+
+    @property
+    def pairs(self) -> BRDF | None:
+        """What was measured, in pairs of directions; None of what is no measurement."""
+        from .measured import from_measurement
+
+        return self.brdf if self.measured is None else from_measurement(self.measured)
+
+    def function(self, wavelengths: Sequence[float] | None = None) -> Function:
+        """f of two directions, for `measured.convert`: what pairs are interpolated to; or what the BSDF reflects.
+
+        A BSDF is that of the active variant; ``wavelengths`` are for spectral ones, by default its own, or a few.
+        """
+        import mitsuba as mi
+
+        from .measured import functions
+
+        if self.brdf is not None and wavelengths:
+            raise ParameterError(f"wavelengths: {self.name} has its own channels, {', '.join(self.brdf.channels)}.")
+        if self.brdf is not None:
+            return functions.of_brdf(self.brdf)
+        bsdf = self.load()
+        if mi.is_spectral:
+            wavelengths = wavelengths or self.wavelengths or WAVELENGTHS
+        return functions.of_bsdf(bsdf, wavelengths, self.name)
 
     @property
     def incidence(self) -> tuple[float, float]:
         """The range of θi, in degrees, that was measured; beyond it Mitsuba would repeat the last values."""
         import numpy as np
 
-        from . import loading
-
         if self.measured is not None:
             theta = self.measured.incident[:, 0]
-        elif self.description is not None and self.description.get("type") in TENSORS.values():
-            theta = np.degrees(loading.tensors(Path(self.description["filename"]))["theta_i"])
+        elif self.brdf is not None:  # by reciprocity
+            theta = np.array([0, max(self.brdf.incident[:, 0].max(), self.brdf.outgoing[:, 0].max())])
+        elif fields := self._tensors(*TENSORS.values()):
+            theta = np.degrees(fields["theta_i"])
         else:
             return ABOVE
         return float(theta.min()), float(theta.max())
 
+    def _tensors(self, *plugins: str) -> dict[str, Any]:
+        """What is in the file of one of Mitsuba's plugins for measurements; nothing of another material."""
+        from . import loading
+
+        given = self.description or {}
+        file = given.get("filename")
+        readable = given.get("type") in plugins and isinstance(file, str) and os.path.isfile(file)
+        return loading.tensors(Path(str(file))) if readable else {}
+
     def load(self) -> Any:
         """The ``mi.BSDF`` of the active variant; raises ParameterError if there is none.
 
-        A measurement is interpolated by Mitsuba's plugin ``measured``, as `goniophotometer.tensor_file` says.
+        A measurement is interpolated by Mitsuba's plugin ``measured``, as `goniophotometer.tensor_file` says; pairs of
+        directions, first to what its table needs, as `measured.functions` says.
         """
         import mitsuba as mi
 
@@ -79,8 +141,8 @@ class Material:
         from .lab.evaluate import active_variant
 
         active_variant()
-        if self.measured is not None:
-            return _interpolated(self.measured)
+        if self.measured is not None or self.brdf is not None:
+            return _interpolated(self.measured, self.brdf)
         found = self.bsdf if self.description is None else loading.load(self.description)
         if isinstance(found, mi.BSDF):
             return found
@@ -104,7 +166,7 @@ def resolve(what: Any, settings: Iterable[str] | Mapping[str, Any] = ()) -> Mate
     if not settings:
         return found
     if found.description is None:
-        kind = "measurement" if found.measured is not None else "BSDF that is loaded already"
+        kind = "BSDF that is loaded already" if found.bsdf is not None else "measurement"
         raise ParameterError(f"{found.name}: settings change a description, and this is a {kind}.")
     return replace(found, description=changed(found.description, settings))
 
@@ -122,7 +184,10 @@ def _found(what: Any) -> Material:
     if _is_bsdf(what):
         return Material(str(what.class_name()), bsdf=what)
     from .goniophotometer import Measurement
+    from .measured import BRDF
 
+    if isinstance(what, BRDF):
+        return Material(what.source or "measurement", brdf=what)
     if isinstance(what, Measurement):
         return Material(str(what.about["geometry"].get("type", "measurement")), measured=what)
     raise ParameterError(f"material: expected a name, a file, a description or a BSDF, not a {_kind(what)}.")
@@ -159,12 +224,15 @@ def _from_file(path: Path) -> Material:
 
     if os.path.isdir(path):
         raise UnreadableFileError("material", path, FORMATS, "it is a folder")
-    readable("material", path, FORMATS)
     ending = path.suffix.lower()
-    if ending == ".npz":
+    if ending in PAIRS:
+        from . import measured
         from .goniophotometer import Measurement
 
-        return Material(path.stem, measured=Measurement.load(path))
+        if ending == ".npz" and not measured.archive.is_brdf(path):
+            return Material(path.stem, measured=Measurement.load(path))
+        return Material(path.stem, brdf=measured.load(path))
+    readable("material", path, FORMATS)
     if ending in TENSORS:
         description = {"type": TENSORS[ending], "filename": str(path.resolve())}
         loading.check(description)
@@ -225,14 +293,18 @@ def _names() -> list[str]:
     return [*presets.names(), *MODELS, *(name for name in plugins if kind(name) == mi.ObjectType.BSDF)]
 
 
-def _interpolated(measured: Measurement) -> Any:
-    """The measurement as a BSDF of the active variant."""
+def _interpolated(measured: Measurement | None, brdf: BRDF | None) -> Any:
+    """A measurement as a BSDF of the active variant."""
     from . import loading
     from .goniophotometer import tensor_file
+    from .measured import conversion, functions
 
     with tempfile.TemporaryDirectory(prefix="asperity-") as folder:
         path = Path(folder) / "measured.bsdf"
-        tensor_file.write(measured, path)
+        if measured is not None:
+            tensor_file.write(measured, path)
+        elif brdf is not None:
+            conversion.table(functions.of_brdf(brdf), path)
         return loading.load({"type": "measured", "filename": str(path)})
 
 

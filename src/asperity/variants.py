@@ -39,8 +39,13 @@ def of_arrays(wavelengths: bool = False) -> str:
 
 def of(materials: Sequence[Material], wavelengths: bool = False) -> str:
     """The same, with the channels that measurements among the materials have."""
-    modes = [material.measured.mode for material in materials if material.measured is not None]
+    modes = [material.mode for material in materials if material.mode]
     return with_channels(of_arrays(wavelengths), modes[0] if modes else "")
+
+
+def of_bsdf(material: Material, wavelengths: bool = False) -> str:
+    """The same, in which Mitsuba renders a material: tables of one channel, in RGB."""
+    return of_arrays(True) if wavelengths else with_channels(of_arrays(), material.mode.replace("mono", "rgb"))
 
 
 def with_channels(variant: str, mode: str) -> str:

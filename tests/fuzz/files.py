@@ -7,6 +7,7 @@ import io
 import json
 import struct
 import warnings
+import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +19,9 @@ import numpy as np
 from asperity import loading
 from asperity.goniophotometer import Hemisphere, Measurement, measure
 from asperity.goniophotometer.mesh import HeightField
+from asperity.materials import resolve
+from asperity.measured import BRDF, archive, conversion, goniometer, load
+from asperity.measured.functions import Function, of_brdf, random_pairs
 from asperity.scenes import meshes, presets
 from asperity.scenes.objects import sphere
 from asperity.scenes.preview import read_map
@@ -57,6 +61,56 @@ def write_seeds(folder: Path) -> None:
     )
     traced.save(path)
     tensor_file.write(traced, folder / "tensors.bsdf")
+
+
+def write_measured(folder: Path) -> None:
+    """Good files of measured BRDFs, small ones."""
+    wi, wo = random_pairs(40)
+    data = BRDF(wi, wo, 0.1 + wi * wo, ("R", "G", "B"), np.full((40, 3), 0.01), weights=np.ones(40))
+    archive.save(data, folder / "pairs.npz")
+    goniometer.save(data, folder / "pairs.csv")
+    f = Function(lambda wi, wo: 0.1 + wi * wo, ("R", "G", "B"))
+    for ending in (".binary", ".bsdf"):
+        conversion.convert(f, folder / f"grid{ending}", resolution=4)
+    (folder / "rendered.bsdf").write_bytes((folder / "grid.bsdf").read_bytes())
+
+
+def damaged_measurement(name: str, content: bytes, random: np.random.Generator) -> bytes:
+    """The same as `damaged`, or with other numbers; of an archive, a part, whose checksum is right."""
+    how = random.integers(4)
+    if how == 0:
+        return damaged(content, random)
+    if name.endswith(".csv"):
+        return with_another_cell(content, random)
+    if not name.endswith(".npz"):
+        return with_another_number(content, random)
+    with zipfile.ZipFile(io.BytesIO(content)) as given:
+        members = {one: given.read(one) for one in given.namelist()}
+    one = sorted(members)[random.integers(len(members))]
+    members[one] = (damaged if how == 1 else with_another_number)(members[one], random)
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archived:
+        for member, data in members.items():
+            archived.writestr(member, data)
+    return made.getvalue()
+
+
+def with_another_number(content: bytes, random: np.random.Generator) -> bytes:
+    """Four or eight bytes are other ones, half of the time in the first 600, where counts are."""
+    numbers = [struct.pack(f"<{kind}", x) for kind in "fd" for x in (np.nan, np.inf, -1.0, 0.0, 1e30, 1e-30)]
+    numbers += [struct.pack("<i", x) for x in (0, 1, -1, 2**31 - 1, 10**6, 7)] + [struct.pack("<q", 10**12)]
+    number = numbers[random.integers(len(numbers))]
+    place = int(random.integers(len(content) if random.random() < 0.5 else min(len(content), 600))) // 4 * 4
+    return content[:place] + number + content[place + len(number) :]
+
+
+def with_another_cell(content: bytes, random: np.random.Generator) -> bytes:
+    """A cell of a table has another word, or there is a further one."""
+    rows = [row.split(b",") for row in content.split(b"\n")]
+    row = rows[random.integers(len(rows)) if random.random() < 0.8 else 0]
+    place = int(random.integers(len(row)))
+    row[place : place + int(random.random() < 0.9)] = [WORDS[random.integers(len(WORDS))]]
+    return b"\n".join(b",".join(row) for row in rows)
 
 
 def serialized(vertices: Any, faces: Any) -> bytes:
@@ -113,6 +167,17 @@ def textured(path: Path) -> Any:
     return looked_at(loading.load({"type": "diffuse", "reflectance": {"type": "bitmap", "filename": str(path)}}))
 
 
+def interpolated(path: Path) -> list[float]:
+    """Values between those of a file."""
+    data = load(path)
+    return [float(x) for x in of_brdf(data)(*random_pairs(20)).ravel()]
+
+
+MEASURED: dict[str, Callable[[Path], Any]] = {
+    **dict.fromkeys(("grid.binary", "grid.bsdf", "pairs.csv", "pairs.npz"), interpolated),
+    "rendered.bsdf": lambda path: looked_at(resolve(path).load()),
+}
+"""The same for files of measured BRDFs."""
 READERS: dict[str, Callable[[Path], Any]] = {
     "full.ply": lambda path: show(meshes.to_mitsuba(meshes.from_file(path), {"type": "diffuse"})),
     "ascii.ply": lambda path: show(loading.load({"type": "ply", "filename": str(path)})),

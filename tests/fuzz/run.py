@@ -1,6 +1,6 @@
 """Random descriptions of materials and damaged files, tried in child processes that are watched.
 
-    python tests/fuzz/run.py --count 10000 --files 2000 --seed 1
+    python tests/fuzz/run.py --count 10000 --files 2000 --measured 50000 --seed 1
 
 Nothing may crash, hang, accept what is flawed, give values that are not finite or negative, or complain obscurely.
 What does is listed with the command that repeats it; the exit status is then 1.
@@ -24,6 +24,8 @@ from typing import NamedTuple
 HERE = Path(__file__).parent
 ROTATION = {"scalar_rgb": 200, "scalar_spectral": 200, "llvm_ad_rgb": 40, "llvm_ad_spectral": 40}
 """Variants in turn, and how many cases their children try; LLVM compiles for each of them."""
+EACH = 5000
+"""Files of measured BRDFs that a child tries."""
 GOOD = ("fine", "refused")
 START = 120
 """Seconds in which a child has imported everything and made its files."""
@@ -94,9 +96,15 @@ def plan(kind: str, count: int) -> Iterator[tuple[str, str, int, int]]:
         start += size
 
 
-def fuzz(count: int, files: int, seed: int, jobs: int, patience: float) -> list[Outcome]:
+def of_measured(count: int) -> Iterator[tuple[str, str, int, int]]:
+    """The same for files of measured BRDFs, in a variant that reads them all."""
+    for start in range(0, count, EACH):
+        yield "measured", "llvm_ad_rgb", start, min(start + EACH, count)
+
+
+def fuzz(count: int, files: int, measured: int, seed: int, jobs: int, patience: float) -> list[Outcome]:
     """All outcomes, in the order of the cases."""
-    batches = [*plan("descriptions", count), *plan("files", files)]
+    batches = [*plan("descriptions", count), *plan("files", files), *of_measured(measured)]
     with ThreadPoolExecutor(jobs) as pool:
         run = pool.map(lambda b: list(batch(b[0], b[1], seed, b[2], b[3], patience)), batches)
         return [outcome for outcomes in run for outcome in outcomes]
@@ -107,6 +115,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=1000, help="descriptions")
     parser.add_argument("--files", type=int, default=200, help="damaged files")
+    parser.add_argument("--measured", type=int, default=400, help="damaged files of measured BRDFs")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2, help="children at a time")
     parser.add_argument("--patience", type=float, default=60, help="seconds until a case hangs")
@@ -116,7 +125,7 @@ def main() -> None:
         kind, variant, seed, index = given.only
         outcomes = list(batch(kind, variant, int(seed), int(index), int(index) + 1, given.patience))
     else:
-        outcomes = fuzz(given.count, given.files, given.seed, given.jobs, given.patience)
+        outcomes = fuzz(given.count, given.files, given.measured, given.seed, given.jobs, given.patience)
     bad = [outcome for outcome in outcomes if outcome.result not in GOOD]
     print("\n".join(map(str, outcomes if given.only else bad)))
     print(Counter(outcome.result.split(":")[0] for outcome in outcomes))

@@ -14,6 +14,16 @@ def test_nothing_crashes_hangs_or_passes_in_silence(kind, variant, count):
     assert {outcome.result for outcome in outcomes} == set(run.GOOD)
 
 
+@pytest.mark.parametrize("count", [300, pytest.param(50_000, marks=pytest.mark.slow)])
+def test_damaged_measurements_are_read_or_refused(count):
+    """A fifth of the files each are of MERL, RGL, CSV, our own, and RGL's as they are rendered."""
+    outcomes = list(run.batch("measured", "llvm_ad_rgb", 3, 0, count, patience=60))
+    assert [outcome.index for outcome in outcomes] == list(range(count))
+    assert [str(outcome) for outcome in outcomes if outcome.result not in run.GOOD] == []
+    for kind in range(5):
+        assert {outcome.result for outcome in outcomes[kind::5]} == set(run.GOOD)
+
+
 WORKER = """
 import json, os, sys, time
 for index in range(int(sys.argv[4]), int(sys.argv[5])):

@@ -68,6 +68,15 @@ def described(seed: int, index: int) -> Case:
     return Case(told, lambda: nowhere_negative(values(loading.load(description), rng)), bool(flaw))
 
 
+def measured(seed: int, index: int, seeds: Path, folder: Path) -> Case:
+    """A damaged file of a measured BRDF."""
+    rng = np.random.default_rng([seed, index, 2])
+    name = sorted(files.MEASURED)[index % len(files.MEASURED)]
+    path = folder / name
+    path.write_bytes(files.damaged_measurement(name, (seeds / name).read_bytes(), rng))
+    return Case(name, lambda: files.quietly(files.MEASURED[name])(path), False)
+
+
 def damaged(seed: int, index: int, seeds: Path, folder: Path) -> Case:
     """A damaged file."""
     rng = np.random.default_rng([seed, index, 1])
@@ -110,12 +119,13 @@ def main(kind: str, variant: str, seed: int, indices: range) -> None:
         seeds, folder = Path(temporary) / "seeds", Path(temporary) / "damaged"
         seeds.mkdir()
         folder.mkdir()
-        if kind == "files":
-            files.write_seeds(seeds)
+        if kind != "descriptions":
+            {"files": files.write_seeds, "measured": files.write_measured}[kind](seeds)
         mi.set_variant(variant)
         mi.set_log_level(mi.LogLevel.Error)
         for index in indices:
-            case = described(seed, index) if kind == "descriptions" else damaged(seed, index, seeds, folder)
+            of_files = {"files": damaged, "measured": measured}
+            case = of_files[kind](seed, index, seeds, folder) if kind in of_files else described(seed, index)
             tell(trying=index, what=case.what)
             tell(index=index, result=outcome(case), what=case.what)
 

@@ -25,6 +25,7 @@ def brdf(**changed):
         ({"wo": WO[:1]}, "wo is of shape"),
         ({"values": np.ones((2, 3))}, "values is of shape"),
         ({"values": np.array([[1], [np.nan]])}, "values is not finite in 1 of 2 pairs, the first number 1"),
+        ({"values": np.array([[1], [1e60]])}, "values is as large as 1e\\+60"),
         ({"wi": WI * 2}, "wi holds directions that are not of length 1"),
         ({"wo": WO * [1, 1, -1]}, "wo holds directions that are not above"),
         ({"errors": -np.ones((2, 1))}, "errors has numbers below 0"),

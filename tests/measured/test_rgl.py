@@ -82,6 +82,7 @@ def test_another_variant_is_refused(rgb, tmp_path):
         ({"rgb": np.full((1, 3, 3, 8, 8), np.nan, "f4")}, "its 'rgb' is not finite"),
         ({"theta_i": np.float32([0, 1, 3])}, "out of range"),
         ({"theta_i": np.float64([0, 1, 1.2])}, "type float64"),
+        ({"jacobian": np.ones(0, "u1")}, "its 'jacobian' is of shape"),
         ({"ndf": np.ones(4, "f4")}, "its 'ndf' is of shape"),
     ],
 )

@@ -9,7 +9,23 @@ import typer
 
 from asperity import __version__
 
-from . import bench, check, cite, compare, doctor, fit, list, measure, merge, plot, render, reproduce, show, validate
+from . import (
+    bench,
+    check,
+    cite,
+    compare,
+    convert,
+    doctor,
+    fit,
+    list,
+    measure,
+    merge,
+    plot,
+    render,
+    reproduce,
+    show,
+    validate,
+)
 from .errors import OneLineErrors
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -22,6 +38,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "plot": plot.plot,
     "compare": compare.compare,
     "fit": fit.fit,
+    "convert": convert.convert,
     "merge": merge.merge,
     "validate": validate.validate,
     "reproduce": reproduce.reproduce,

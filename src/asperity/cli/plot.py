@@ -104,8 +104,12 @@ def plot(
 
 
 def is_measurement(given: str) -> bool:
-    """Whether an argument is a measurement of ours."""
-    return not is_text(given) and given.lower().endswith(".npz")
+    """Whether an argument is a measurement of the virtual goniophotometer."""
+    if is_text(given) or not given.lower().endswith(".npz"):
+        return False
+    from asperity.measured import archive
+
+    return not archive.is_brdf(Path(given))
 
 
 def is_text(given: str) -> bool:
@@ -122,7 +126,7 @@ def default_path(given: str, view: str | None) -> Path:
 
 def suited(shown: Sequence[Material]) -> str | None:
     """The variant with the channels of the first measurement; None if any will do."""
-    modes = [material.measured.mode for material in shown if material.measured is not None]
+    modes = [material.mode for material in shown if material.mode]
     return f"llvm_ad_{modes[0]}" if modes and modes[0] != "rgb" else None
 
 

@@ -141,7 +141,7 @@ def _loaded(material: Material, view: str) -> Material:
     """
     if material.measured is not None and view in MEASURED:
         return material
-    note = ", interpolated" if material.measured is not None else ""
+    note = ", interpolated" if material.measured is not None or material.brdf is not None else ""
     bsdf = material.load()
     flags = bsdf.flags()
     if view not in ALL_LIGHT and mi.has_flag(flags, mi.BSDFFlags.Delta):
@@ -150,4 +150,4 @@ def _loaded(material: Material, view: str) -> Material:
                 f"{material.name} is all mirror, or clear glass: its values are 0, and view albedo shows it."
             )
         note = " without its mirror"
-    return replace(material, name=material.name + note, description=None, bsdf=bsdf, measured=None)
+    return replace(material, name=material.name + note, description=None, bsdf=bsdf, measured=None, brdf=None)

@@ -1,4 +1,4 @@
-"""Writes a measurement as the file that Mitsuba's own plugin ``measured`` renders (the RGL format).
+"""Writes a measurement, or any BRDF, as the file that Mitsuba's own plugin ``measured`` renders (the RGL format).
 
 >>> write(measure(ExplicitGrains(tau_0=0.5), [(theta, 0) for theta in (0, 15, 30, 45, 60, 75, 85)]), "grains.bsdf")
 >>> mi.load_dict({"type": "measured", "filename": "grains.bsdf"})
@@ -32,6 +32,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,28 +56,70 @@ def write(measurement: Measurement, path: str | Path) -> None:
     89 degrees are good ends. A measurement in RGB or mono is for RGB variants, one at wavelengths for spectral ones.
     Light that goes downwards is left out.
     """
-    from mitsuba.python import tensor_io
-
     sensor, values = measurement.sensor, measurement.summed.value
     theta, phi, rows = angles_of_incidence(sensor, measurement.incident)
     assert isinstance(sensor, Hemisphere)
     if not (np.all(np.isfinite(values)) and np.all(measurement.paths.sum(axis=0))):
         raise ParameterError("values: expected finite ones in all directions of incidence.")
-    isotropic = len(phi) == 1
-    start = measurement.incident[0, 1] if isotropic else 0.0
-    slices = [_tables(sensor, values[row], measurement.wi[row], start) for row in rows.flat]
-    table, luminance = (np.stack(x).reshape(rows.shape + x[0].shape) for x in zip(*slices))
-    if isotropic:
-        phi, table = np.zeros(1), (table + table[..., ::-1, :]) / 2
-        luminance = (luminance + luminance[..., ::-1, :]) / 2
+    start = measurement.incident[0, 1] if len(phi) == 1 else 0.0
+    n = max(sensor.rows, sensor.columns)
+
+    def slice(row: int) -> tuple[np.ndarray, ...]:
+        return _tables(lambda wo: _between_cells(sensor, values[row], wo), measurement.wi[row], n, start)
+
+    slices = [slice(row) for row in rows.flat]
+    if len(phi) == 1:
+        slices = [tuple((x + x[..., ::-1, :]) / 2 for x in one) for one in slices]
+    _write(path, theta, phi, slices, measurement.channels, measurement.about)
+
+
+def tabulate(
+    f: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    path: str | Path,
+    theta: Sequence[float],
+    phi: Sequence[float],
+    n: int,
+    channels: Sequence[str],
+    about: Any = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
+    """Write any BRDF: f (n, channels) in 1/sr, for ``wi`` and ``wo`` (n, 3) above the surface.
+
+    ``theta`` and ``phi`` are angles of incidence, in degrees, as `write` has them; ``n`` counts θ_m, and φ_m (the
+    plugin wants as many). ``about`` becomes the description in the file.
+    """
+    incident = directions([(t, p) for p in phi for t in theta])
+    start = phi[0] if len(phi) == 1 else 0.0
+
+    def slice(k: int) -> tuple[np.ndarray, ...]:
+        progress(k, len(incident))
+        return _tables(lambda wo: f(np.broadcast_to(incident[k], wo.shape), wo), incident[k], n, start)
+
+    slices = [slice(k) for k in range(len(incident))]
+    _write(path, np.radians(theta), np.radians(phi), slices, channels, about)
+
+
+def _write(
+    path: str | Path,
+    theta: np.ndarray,
+    phi: np.ndarray,
+    slices: Sequence[tuple[np.ndarray, ...]],
+    channels: Sequence[str],
+    about: Any,
+) -> None:
+    """Write `_tables` of all angles of incidence, θ_i fastest, in radians."""
+    from mitsuba.python import tensor_io
+
+    table, luminance = (np.stack(x).reshape(len(phi), len(theta), *x[0].shape) for x in zip(*slices))
+    if len(phi) == 1:
+        phi = np.zeros(1)
     else:
         around = [len(phi) - 1, *range(len(phi)), 0]
         phi = phi[around] + 2 * np.pi * np.array([-1, *np.zeros(len(phi)), 1])
         table, luminance = table[around], luminance[around]
-    names = measurement.about["channels"]
     fields = {}
-    if names[0].endswith(" nm"):
-        wavelengths = np.array([float(name.removesuffix(" nm")) for name in names])
+    if channels[0].endswith(" nm"):
+        wavelengths = np.array([float(name.removesuffix(" nm")) for name in channels])
         order = np.argsort(wavelengths)
         fields = {"wavelengths": wavelengths[order], "spectra": table[:, :, order]}
     else:
@@ -93,7 +136,7 @@ def write(measurement: Measurement, path: str | Path) -> None:
     with atomically(Path(path)) as part, contextlib.redirect_stdout(io.StringIO()):
         tensor_io.write(
             str(part),
-            description=json.dumps(measurement.about),
+            description=json.dumps(about),
             jacobian=np.ones(1, dtype=np.uint8),
             **{name: values.astype(np.float32) for name, values in fields.items()},
         )
@@ -118,28 +161,40 @@ def angles_of_incidence(sensor: Sensor, incident: Any) -> tuple[np.ndarray, np.n
     return np.radians(thetas), np.radians(phis), rows
 
 
-def _tables(sensor: Hemisphere, values: np.ndarray, wi: np.ndarray, start: float) -> tuple[np.ndarray, np.ndarray]:
-    """`spectra` (channels, n, n) and `luminance` (n, n) of one direction of incidence; azimuths from ``start`` on."""
-    n = max(sensor.rows, sensor.columns)
+def _tables(
+    f: Callable[[np.ndarray], np.ndarray], wi: np.ndarray, n: int, start: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """`spectra` (channels, n, n) and `luminance` (n, n) of one direction of incidence.
+
+    ``f`` (k, channels) is asked for ``wo`` (k, 3) above the surface; azimuths begin at ``start``.
+    """
     u, turn = np.meshgrid(np.linspace(0, 1, n), np.linspace(-180, 180, n))
     m = directions(np.stack([np.degrees(_theta(u)), turn + start], axis=-1).reshape(-1, 2))
     i_m = m @ wi
     wo = 2 * i_m[:, None] * m - wi
-    cosine = np.where(i_m > 0, np.maximum(wo[:, 2], 0), 0)
-    f = np.array([_between_cells(sensor, channel, wo) for channel in values.T])
-    value = (f * cosine).reshape(-1, n, n)
-    density = value.mean(axis=0) * u * np.sin(_theta(u)) * i_m.reshape(n, n)
+    above = (i_m > 0) & (wo[:, 2] > 0)
+    found = f(wo[above]) * wo[above, 2:]
+    value = np.zeros((found.shape[1], len(m)))
+    value[:, above] = found.T
+    value = value.reshape(-1, n, n)
+    density = np.maximum(value.mean(axis=0), 0) * u * np.sin(_theta(u)) * i_m.clip(0).reshape(n, n)
     return value * wi[2], density if density.any() else np.ones((n, n))
 
 
 def _between_cells(sensor: Hemisphere, values: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    """f at directions (n, 3), from the means of f cosθ_o over the cells: bilinear, across the pole, even at the rim."""
+    """f (n, channels) at directions (n, 3), from means of f cosθ_o over the cells (cells, channels).
+
+    It is bilinear, across the pole, and even at the rim.
+    """
     cosine = 1 - (np.arange(sensor.rows) + 0.5) / sensor.rows  # its mean over a cell, too
-    f = values.reshape(sensor.rows, sensor.columns) / cosine[:, None]
-    f = np.concatenate([np.roll(f[:1], sensor.columns // 2, axis=1), f, f[-1:]])
     turn = np.arctan2(wo[:, 1], wo[:, 0]) / (2 * np.pi) % 1
     where = [(1 - np.clip(wo[:, 2], 0, 1)) * sensor.rows + 0.5, turn * sensor.columns + 0.5]
-    return map_coordinates(np.pad(f, ((0, 0), (1, 1)), "wrap"), where, order=1, mode="nearest")
+    found = []
+    for channel in values.T:
+        f = channel.reshape(sensor.rows, sensor.columns) / cosine[:, None]
+        f = np.concatenate([np.roll(f[:1], sensor.columns // 2, axis=1), f, f[-1:]])
+        found.append(map_coordinates(np.pad(f, ((0, 0), (1, 1)), "wrap"), where, order=1, mode="nearest"))
+    return np.stack(found, axis=-1)
 
 
 def _theta(u: np.ndarray) -> np.ndarray:

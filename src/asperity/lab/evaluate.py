@@ -187,6 +187,18 @@ def at_pairs(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = N
     return np.concatenate([to_numpy(value, len(wi)), to_numpy(density, len(wi))])
 
 
+def spectra(bsdf: mi.BSDF, wi: np.ndarray, wo: np.ndarray, wavelengths: Any = None) -> np.ndarray:
+    """Return f |cos θo| (channels, n) for pairs of directions (n, 3), at any number of wavelengths.
+
+    It is asked for as many at a time as the variant has.
+    """
+    if wavelengths is None:
+        return at_pairs(bsdf, wi, wo)[:-1]
+    count = dr.size_v(mi.UnpolarizedSpectrum)
+    groups = np.pad(wavelengths, (0, -len(wavelengths) % count), mode="edge").reshape(-1, count)
+    return np.concatenate([at_pairs(bsdf, wi, wo, group)[:-1] for group in groups])[: len(wavelengths)]
+
+
 def vectors(directions: np.ndarray) -> mi.Vector3f:
     """Return an array (n, 3) as ``n`` Mitsuba vectors."""
     return mi.Vector3f(np.ascontiguousarray(directions.T, dtype=np.float32))

@@ -13,6 +13,7 @@ from ..errors import UnreadableFileError
 from . import archive, goniometer, merl, rgl
 from .brdf import BRDF as BRDF
 from .brdf import from_measurement as from_measurement
+from .conversion import convert as convert
 
 LOADERS = {format: module.load for module in (merl, rgl, goniometer, archive) for format in module.FORMATS}  # type: ignore[attr-defined]
 """What reads a file, by its ending."""

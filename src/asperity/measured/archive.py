@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..files import atomically
 from ..goniophotometer import Measurement
+from ..loading import short
 from .brdf import BRDF, from_measurement
 from .files import MOST, reading
 
@@ -48,7 +49,7 @@ def load(path: str | Path) -> BRDF:
         except (ParameterError, MemoryError):
             raise
         except Exception as error:  # of zipfile, zlib, NumPy and json: damage shows in any way
-            raise ParameterError(f"not written by asperity ({error})") from error
+            raise ParameterError(f"not written by asperity ({short(str(error), 100)})") from error
 
 
 def is_brdf(path: Path) -> bool:

@@ -13,6 +13,8 @@ from ..errors import ParameterError
 from ..goniophotometer import Measurement
 
 Array = NDArray[np.float64]
+LARGEST = 1e30
+"""Of numbers: what is beyond would overflow."""
 UNIT = 1e-3
 """How far the length of a direction may be from 1, as rounded as files have it."""
 
@@ -47,6 +49,8 @@ class BRDF:
                 raise ParameterError(
                     f"{name} is not finite in {len(wrong)} of {pairs} pairs, the first number {wrong[0]}"
                 )
+            if np.abs(numbers).max() > LARGEST:
+                raise ParameterError(f"{name} is as large as {np.abs(numbers).max():.3g}, which is damage")
             object.__setattr__(self, name, numbers)
         for name in ("wi", "wo"):
             w = getattr(self, name)

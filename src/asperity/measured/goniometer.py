@@ -99,14 +99,23 @@ def load(
 
 
 def save(brdf: BRDF, path: str | Path) -> None:
-    """Write a table: angles in degrees, a column a channel, ``error ...`` columns if errors are known."""
+    """Write a table: angles in degrees, a column a channel, ``error ...`` columns if errors are known.
+
+    Pairs of an isotropic BRDF are turned until φ_i = 0, which is how a reader knows. Angles get eleven digits: the half
+    vectors of MERL's grid, from 0.01 degrees on, are differences of them.
+    """
     header = [f"{name} [deg]" for name in ANGLES] + list(brdf.channels)
-    numbers = [brdf.incident, brdf.outgoing, brdf.values]
+    incident, outgoing = brdf.incident, brdf.outgoing
+    if brdf.isotropic:
+        outgoing[:, 1] = (outgoing[:, 1] - incident[:, 1]) % 360
+        incident[:, 1] = 0
+    numbers = [incident, outgoing, brdf.values]
     if brdf.errors is not None:
         header += [f"error {name}" for name in brdf.channels]
         numbers.append(brdf.errors)
     with atomically(Path(path)) as part:
-        np.savetxt(part, np.concatenate(numbers, axis=1), "%.9g", ",", header=",".join(header), comments="")
+        digits = ["%.11g"] * len(ANGLES) + ["%.9g"] * (len(header) - len(ANGLES))
+        np.savetxt(part, np.concatenate(numbers, axis=1), digits, ",", header=",".join(header), comments="")
 
 
 def _read(path: Path) -> _Table:

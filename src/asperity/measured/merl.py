@@ -146,15 +146,16 @@ def coordinates(wi: Array, wo: Array, counts: tuple[int, ...]) -> Array:
 
 
 def interpolate(table: Array, wi: Array, wo: Array) -> Array:
-    """f (n, 3) between the nodes, linear in all three coordinates, from nodes that have a value; 0 without any.
+    """f (n, channels) between the nodes of a table (θ_h, θ_d, φ_d, channels); 0 where none around has a value.
 
-    Beyond the last node of θ_h and θ_d it keeps its values, and φ_d goes around.
+    It is linear in all three coordinates, from the nodes that have a value. Beyond the last node of θ_h and θ_d it
+    keeps its values, and φ_d goes around.
     """
     counts = np.array(table.shape[:3])
     place = coordinates(wi, wo, table.shape[:3])
     first = np.floor(place).astype(int)
     part = place - first
-    total, weights = np.zeros((len(wi), 3)), np.zeros((len(wi), 1))
+    total, weights = np.zeros((len(wi), table.shape[3])), np.zeros((len(wi), 1))
     for corner in np.ndindex(2, 2, 2):
         at = first + corner
         i, j = (np.minimum(at[:, k], counts[k] - 1) for k in (0, 1))
@@ -164,19 +165,38 @@ def interpolate(table: Array, wi: Array, wo: Array) -> Array:
     return total / np.where(weights > 0, weights, 1)
 
 
+def counts(brdf: BRDF) -> tuple[int, int, int] | None:
+    """The counts of the grid that pairs seem to be nodes of, by the last ones; None if they are of none.
+
+    The last θ_h is that of a pair wi = wo, the others those of pairs about the normal, all of them above the surface.
+    """
+    theta_h, theta_d, phi_d = np.moveaxis(coordinates(brdf.wi, brdf.wo, (1, 1, 1)), -1, 0)
+    tilted = (theta_d > NEAR) & (theta_h > NEAR)  # elsewhere φ_d has no meaning
+    if not brdf.isotropic or not tilted.any():
+        return None
+    last = np.array([theta_h.max(), theta_d.max(), phi_d[tilted & (phi_d < 1 - NEAR**2)].max(initial=0)])
+    found = np.round(1 / np.maximum(1 - last, NEAR**2))
+    if np.abs(found * (1 - last) - 1).max() > NEAR or np.prod(found) > 2 * np.prod(COUNTS):
+        return None
+    return tuple(int(n) for n in found)  # type: ignore[return-value]
+
+
 def table(brdf: BRDF, counts: tuple[int, int, int] = COUNTS) -> Array | None:
-    """The values on the grid (θ_h, θ_d, φ_d, 3), NaN where there are none; None unless all pairs lie on its nodes."""
-    if brdf.channels != CHANNELS or not brdf.isotropic or len(brdf) > np.prod(counts):
+    """The values on the grid (θ_h, θ_d, φ_d, channels), NaN where there are none; None unless all are its nodes."""
+    if not brdf.isotropic or len(brdf) > np.prod(counts):
         return None
     place = coordinates(brdf.wi, brdf.wo, counts)
     index = np.round(place).astype(int)
     off = np.abs(place - index)
     index[:, 2] %= counts[2]
-    off[index[:, 1] == 0, 2] = 0
+    off[(index[:, :2] == 0).any(axis=1), 2] = 0  # there φ_d has no meaning
     if off.max() > NEAR or (index[:, :2] >= counts[:2]).any():
         return None
-    found = np.full((*counts, 3), np.nan)
+    found = np.full((*counts, len(brdf.channels)), np.nan)
     found[tuple(index.T)] = brdf.values
     same = index[:, 1] == 0
     found[index[same, 0], 0] = brdf.values[same, None]
+    straight, known = found[0], np.isfinite(found[0])
+    mean = np.where(known, straight, 0).sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
+    found[0] = np.where(~known & known.any(axis=1, keepdims=True), mean, straight)
     return found

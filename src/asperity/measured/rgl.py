@@ -43,7 +43,7 @@ def load(path: str | Path) -> BRDF:
         wi, wo = _vertices(fields)
         above = (wi[:, 2] > LEAST) & (wo[:, 2] > LEAST)
         wavelengths = None if channels[0] == "R" else [float(name.split()[0]) for name in channels]
-        values = _values(bsdf, wi[above], wo[above], wavelengths)
+        values = evaluate.spectra(bsdf, wi[above], wo[above], wavelengths).T / wo[above, 2:]
         told = (
             bytes(fields["description"].astype(np.uint8)).decode("utf-8", "replace") if "description" in fields else ""
         )
@@ -66,6 +66,8 @@ def _checked(fields: dict[str, Any]) -> tuple[str, ...]:
     if missing := [one for one in needed if one not in fields]:
         raise ParameterError(f"its {missing[0]!r} is missing")
     dimensions = {"phi_i": 1, "theta_i": 1, "wavelengths": 1, "sigma": 2, "ndf": 2, "vndf": 4, "luminance": 4, name: 5}
+    if fields["jacobian"].shape != (1,) or fields["jacobian"].dtype != np.uint8:
+        raise ParameterError(f"its 'jacobian' is of shape {fields['jacobian'].shape}, not one byte")
     for one, count in dimensions.items():
         if one in needed and (fields[one].ndim != count or not fields[one].size or fields[one].dtype != np.float32):
             raise ParameterError(f"its {one!r} is of shape {fields[one].shape} and type {fields[one].dtype}")
@@ -101,16 +103,3 @@ def _vertices(fields: dict[str, Any]) -> tuple[Array, Array]:
 
 def _directions(theta: Array, phi: Array) -> Array:
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-
-
-def _values(bsdf: Any, wi: Array, wo: Array, wavelengths: list[float] | None) -> Array:
-    """f (n, channels) of a BSDF, at as many wavelengths at a time as the variant has."""
-    import drjit as dr
-    import mitsuba as mi
-
-    if wavelengths is None:
-        return evaluate.at_pairs(bsdf, wi, wo)[:-1].T / wo[:, 2:]
-    count = dr.size_v(mi.UnpolarizedSpectrum)
-    groups = np.pad(wavelengths, (0, -len(wavelengths) % count), mode="edge").reshape(-1, count)
-    found = np.concatenate([evaluate.at_pairs(bsdf, wi, wo, group)[:-1] for group in groups])
-    return found[: len(wavelengths)].T / wo[:, 2:]
