@@ -27,7 +27,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from . import drawing, goniophotometer, loading, models, plugin, validation, variants
+from . import drawing, fitting, goniophotometer, loading, models, plugin, validation, variants
 from .arrays import CHUNK, Array, Directions, mapped
 from .drawing import comparison
 from .errors import ParameterError, listed, refuse_unknown, refuse_unused, whole
@@ -48,7 +48,8 @@ SAMPLES = 2**32 - 1
 """Most of a picture that Mitsuba renders at once."""
 MEASURING = [*inspect.signature(goniophotometer.measure).parameters][2:]
 VIEWING = [name for name in inspect.signature(preview).parameters if name not in ("material", "size", "spp", "seed")]
-"""Options that `measure` and `render` pass on."""
+FITTING = [*inspect.signature(fitting.fit).parameters][2:]
+"""Options that `measure`, `render` and `fit` pass on."""
 
 material = resolve
 Model = TypeVar("Model")
@@ -263,6 +264,19 @@ def compare(a: Any, b: Any) -> Compared:
     first, second = found = resolve(a), resolve(b)
     with variants.switched(variants.of(found)):
         return Compared(first, second, comparison.compare(first, second, drawing.distinct_names(found)))
+
+
+def fit(data: Any, model: Any = "all", **options: Any) -> fitting.Fit | list[fitting.Fit]:
+    """Fit a model to measured values: its parameters and their errors, a material, a figure; see `fitting.fit`.
+
+    ``data`` is a file (.binary, .bsdf, .csv, .npz), a `measured.BRDF` or a `Measurement`; ``model`` a name of
+    `fitting.CANDIDATES` or a material, or ``all``: a list of all candidates, the best first. ``options`` are those of
+    `fitting.fit`, and ``models`` of `fitting.rank`.
+    """
+    variants.ensure()
+    refuse_unknown(options, FITTING + ["models"] * (model == "all"), "fitting")
+    found = fitting.data(data)
+    return fitting.rank(found, **options) if model == "all" else fitting.fit(found, model, **options)
 
 
 def presets() -> dict[str, Material]:

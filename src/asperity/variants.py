@@ -34,15 +34,15 @@ def switched(wanted: str) -> Iterator[None]:
 
 def of_arrays(wavelengths: bool = False) -> str:
     """The active variant, or the one like it that computes arrays, and wavelengths if they are asked for."""
-    return _with_channels(ensure().replace("scalar_", "llvm_ad_"), "spectral" if wavelengths else "")
+    return with_channels(ensure().replace("scalar_", "llvm_ad_"), "spectral" if wavelengths else "")
 
 
 def of(materials: Sequence[Material], wavelengths: bool = False) -> str:
     """The same, with the channels that measurements among the materials have."""
     modes = [material.measured.mode for material in materials if material.measured is not None]
-    return _with_channels(of_arrays(wavelengths), modes[0] if modes else "")
+    return with_channels(of_arrays(wavelengths), modes[0] if modes else "")
 
 
-def _with_channels(variant: str, mode: str) -> str:
+def with_channels(variant: str, mode: str) -> str:
     """A variant of ``rgb``, ``mono`` or ``spectral``; itself if it is one."""
     return variant if mode in variant else f"{variant.partition('_')[0]}_ad_{mode}"

@@ -14,7 +14,9 @@ from asperity.measured import archive, from_measurement
 
 
 def test_an_archive_comes_back_as_it_was(tmp_path):
-    one = brdf(errors=np.full((2, 1), 0.1), isotropic=False, source="a lab", left_out={"negative": 3})
+    one = brdf(
+        errors=np.full((2, 1), 0.1), weights=np.ones(2), isotropic=False, source="a lab", left_out={"negative": 3}
+    )
     archive.save(one, tmp_path / "x.npz")
     assert archive.is_brdf(tmp_path / "x.npz")
     found = archive.load(tmp_path / "x.npz")

@@ -28,6 +28,7 @@ def brdf(**changed):
         ({"wi": WI * 2}, "wi holds directions that are not of length 1"),
         ({"wo": WO * [1, 1, -1]}, "wo holds directions that are not above"),
         ({"errors": -np.ones((2, 1))}, "errors has numbers below 0"),
+        ({"weights": np.array([1.0, -1.0])}, "weights: expected 2 finite numbers"),
         ({"channels": ("x",)}, "channels are x"),
         ({"channels": ("532 nm", "532 nm"), "values": np.ones((2, 2))}, "different wavelengths"),
         ({"wi": WI[:0], "wo": WO[:0], "values": np.ones((0, 1))}, "empty"),
@@ -71,3 +72,9 @@ def test_a_constant_brdf_measured_by_the_virtual_goniophotometer_is_constant():
 def test_cells_below_the_surface_are_left_out_and_counted():
     found = from_measurement(traced(Window("mirror", 20, 8), 0.25, [(80, 0)]))
     assert found.left_out["below the surface"] == 64 - len(found) > 0
+
+
+def test_a_subset_keeps_all_that_belongs_to_its_pairs():
+    found = brdf(errors=np.array([[0.1], [0.2]]), weights=np.array([3.0, 4.0]), source="a lab").subset(np.array([1]))
+    assert len(found) == 1 and found.source == "a lab"
+    assert np.array_equal(found.wo, WO[1:]) and found.errors == 0.2 and found.weights == 4

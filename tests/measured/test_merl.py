@@ -119,3 +119,11 @@ def test_what_is_no_file_is_refused(tmp_path):
             merl.load(tmp_path / f"{name}.binary")
     with pytest.raises(UnreadableFileError, match="its ending is"):
         merl.load(tmp_path / "x.txt")
+
+
+def test_weights_are_solid_angles():
+    """Pairs of directions, each even over the hemisphere, have a mean cosine of 1/2, and a mean product of 1/4."""
+    wi, wo = merl.nodes()
+    weights = merl.solid_angles() * ((wi[:, 2] > 0) & (wo[:, 2] > 0))
+    means = [np.average(z, weights=weights) for z in (wi[:, 2], wo[:, 2], wi[:, 2] * wo[:, 2])]
+    assert means == pytest.approx([1 / 2, 1 / 2, 1 / 4], rel=5e-3)  # sums over steps of 1 degree, not integrals

@@ -9,7 +9,7 @@ import typer
 
 from asperity import __version__
 
-from . import bench, check, cite, compare, doctor, list, measure, merge, plot, render, reproduce, show, validate
+from . import bench, check, cite, compare, doctor, fit, list, measure, merge, plot, render, reproduce, show, validate
 from .errors import OneLineErrors
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -21,6 +21,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "measure": measure.measure,
     "plot": plot.plot,
     "compare": compare.compare,
+    "fit": fit.fit,
     "merge": merge.merge,
     "validate": validate.validate,
     "reproduce": reproduce.reproduce,

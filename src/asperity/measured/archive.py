@@ -16,7 +16,7 @@ from .brdf import BRDF, from_measurement
 from .files import MOST, reading
 
 FORMATS = (".npz",)
-ARRAYS = ("wi", "wo", "values", "errors")
+ARRAYS = ("wi", "wo", "values", "errors", "weights")
 ABOUT = ("channels", "isotropic", "source", "left_out")
 MARK = "brdf"
 """The array of such a file that says, in JSON, all that is no number; a `Measurement` has none."""

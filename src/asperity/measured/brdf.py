@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ class BRDF:
     isotropic: bool = True
     source: str = ""
     left_out: Mapping[str, int] = field(default_factory=dict)  # pairs in the file that are not here: why, how many
+    weights: Array | None = None  # (n,): dω_i dω_o that a pair stands for, up to a factor; None if all the same
 
     def __post_init__(self) -> None:
         pairs = len(self.wi)
@@ -55,11 +56,23 @@ class BRDF:
                 raise ParameterError(f"{name} holds directions that are not above the surface")
         if self.errors is not None and self.errors.min() < 0:
             raise ParameterError("errors has numbers below 0")
+        if self.weights is not None:
+            weights = np.asarray(self.weights, dtype=np.float64)
+            if weights.shape != (pairs,) or not (np.isfinite(weights) & (weights >= 0)).all() or not weights.any():
+                raise ParameterError(f"weights: expected {pairs} finite numbers, not below 0, and not all 0")
+            object.__setattr__(self, "weights", weights)
         if self.mode == "spectral" and len(set(self.wavelengths or ())) < len(self.channels):
             raise ParameterError(f"channels are {', '.join(self.channels)}: expected different wavelengths")
 
     def __len__(self) -> int:
         return len(self.wi)
+
+    def subset(self, index: NDArray[np.intp]) -> BRDF:
+        """Some of the pairs, by their numbers; what was ``left_out`` is that of the file."""
+        errors = None if self.errors is None else self.errors[index]
+        weights = None if self.weights is None else self.weights[index]
+        wi, wo, values = self.wi[index], self.wo[index], self.values[index]
+        return replace(self, wi=wi, wo=wo, values=values, errors=errors, weights=weights)
 
     @property
     def mode(self) -> str:

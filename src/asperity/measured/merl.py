@@ -48,7 +48,8 @@ def load(path: str | Path) -> BRDF:
         kept = above & ~negative & ~repeated.ravel()
         left_out = {"below the horizon": int((~above).sum()), "negative": int(negative.sum())}
         source = f"MERL, {path.stem}"
-        return BRDF(wi[kept], wo[kept], values[kept], CHANNELS, source=source, left_out=left_out)
+        weights = solid_angles(table.shape[:3])[kept]  # type: ignore[arg-type]
+        return BRDF(wi[kept], wo[kept], values[kept], CHANNELS, source=source, weights=weights, left_out=left_out)
 
 
 def read(path: Path) -> Array:
@@ -100,6 +101,18 @@ def nodes(counts: tuple[int, int, int] = COUNTS) -> tuple[Array, Array]:
     h, d, p = (np.arange(n) / n for n in counts)
     theta_h, theta_d, phi_d = np.meshgrid(h**2 * np.pi / 2, d * np.pi / 2, p * np.pi, indexing="ij")
     return directions(theta_h.ravel(), theta_d.ravel(), phi_d.ravel())
+
+
+def solid_angles(counts: tuple[int, int, int] = COUNTS) -> Array:
+    """dω_i dω_o of all nodes (n,), up to a factor: 4 cosθ_d dω_h dω_d, each over the step around the node.
+
+    φ_d is even; at θ_d = 0, where all φ_d are the same pair, the first node gets the weight of all.
+    """
+    h = np.radians(90) * np.square(np.clip(np.arange(counts[0] + 1) - 0.5, 0, None) / counts[0])
+    d = np.radians(90) * np.clip(np.arange(counts[1] + 1) - 0.5, 0, None) / counts[1]
+    weights = -np.diff(np.cos(h))[:, None, None] * np.diff(np.square(np.sin(d)))[:, None] * np.ones(counts[2])
+    weights[:, 0, 0] *= counts[2]
+    return weights.ravel()
 
 
 def directions(theta_h: Any, theta_d: Any, phi_d: Any) -> tuple[Array, Array]:

@@ -15,6 +15,8 @@ FORMATS = (".json",)
 DEFAULT = "dusty-wood"
 VIEW = ("object", "env", "light", "floor")
 """What ``preview`` may hold."""
+IGNORED = ("fit",)
+"""What a file may hold beside: how good `asperity fit` found it to be."""
 
 
 class Preset(NamedTuple):
@@ -68,7 +70,7 @@ def _preset(path: Path, content: Any) -> Preset:
     content = _object("it", content)
     if "type" in content:
         content = {"material": content}
-    _known(content, Preset._fields[1:])
+    _known(content, (*Preset._fields[1:], *IGNORED))
     material = _object("material", content.get("material"))
     if not isinstance(material.get("type"), str):
         raise ValueError('it has no BSDF: expected {"type": ...}, or {"material": {"type": ...}}')

@@ -1,0 +1,145 @@
+"""A description at pairs of directions, as a function of its free parameters: values, and derivatives by Dr.Jit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import loading
+from ..lab import evaluate
+from ..measured import BRDF
+from .free import Free, described
+
+Array = NDArray[np.float64]
+STEP = 1e-3
+"""Of central differences, for what Mitsuba has no derivatives by: single precision, smooth functions."""
+RENAMED = {"int_ior": "eta"}
+"""What ``mi.traverse`` calls a parameter of Mitsuba's plugins otherwise; ``ext_ior`` is 1 then."""
+
+
+class Model:
+    """f cosθ_o of a BSDF in the pairs of some data, whose free parameters are a vector of numbers.
+
+    The numbers are those of `Free.unit`, a colour's one after the other, for each channel.
+    """
+
+    def __init__(self, description: dict[str, Any], free: list[Free], channels: tuple[str, ...]):
+        self.free, self.channels = free, channels
+        self.sizes = [len(self.channels) if one.colour else 1 for one in free]
+        middle = {one.path: np.full(n, float(one.value(0.5))) for one, n in zip(free, self.sizes)}
+        self.description = described(description, middle, self.channels)
+        self.bsdf = loading.load(self.description)
+        self.parameters = mi.traverse(self.bsdf)
+        self.keys = [_key(self.parameters, one.path) for one in free]
+
+    def split(self, x: Array) -> list[Array]:
+        """The numbers of each parameter."""
+        return np.split(np.asarray(x, dtype=np.float64), np.cumsum(self.sizes)[:-1])
+
+    def values(self, x: Array) -> dict[str, Array]:
+        """The parameters by their paths."""
+        return {one.path: one.value(unit) for one, unit in zip(self.free, self.split(x))}
+
+    def __call__(self, x: Array, pairs: Lanes) -> Array:
+        """f cosθ_o (channels, n)."""
+        self._set(x)
+        return self._ordered(self._eval(pairs), pairs)
+
+    def derivatives(self, x: Array, pairs: Lanes) -> Array:
+        """Of the values by each parameter (parameters, channels, n); channels of a colour do not mix."""
+        return np.stack([self._derivative(x, k, pairs) for k in range(len(self.free))])
+
+    def jacobian(self, derivatives: Array) -> Array:
+        """By each number (numbers, channels, n): a colour's number of a channel moves that channel only."""
+        rows = []
+        for one, row in zip(self.free, derivatives):
+            rows += [row * (np.arange(len(row)) == k)[:, None] for k in range(len(row))] if one.colour else [row]
+        return np.stack(rows)
+
+    def _derivative(self, x: Array, k: int, pairs: Lanes) -> Array:
+        key, one = self.keys[k], self.free[k]
+        if not self.parameters.flags(key) & int(mi.ParamFlags.NonDifferentiable) and key.endswith(("value", "values")):
+            self._set(x)
+            parameter = self.parameters[key]
+            dr.enable_grad(parameter)
+            dr.set_grad(parameter, _opaque(parameter, one.slope(one.value(self.split(x)[k]))))
+            self.parameters[key] = parameter
+            self.parameters.update()
+            value = self._eval(pairs)
+            found = self._ordered(dr.forward_to(value), pairs)
+            dr.disable_grad(parameter)
+            return found
+        place = sum(self.sizes[:k]) + np.arange(self.sizes[k])
+        ends = []
+        for step in (STEP, -STEP):
+            moved = np.array(x, dtype=np.float64)
+            moved[place] = np.clip(moved[place] + step, one.unit(one.low), one.unit(one.high))
+            ends.append((moved[place].mean(), self(moved, pairs)))
+        (high, above), (low, below) = ends
+        return (above - below) / (high - low)
+
+    def _set(self, x: Array) -> None:
+        for key, value in zip(self.keys, self.values(x).values()):
+            self.parameters[key] = _opaque(self.parameters[key], value)
+        self.parameters.update()
+
+    def _eval(self, pairs: Lanes) -> Any:
+        return mi.unpolarized_spectrum(self.bsdf.eval(mi.BSDFContext(), pairs.si, pairs.wo))
+
+    def _ordered(self, value: Any, pairs: Lanes) -> Array:
+        """(channels, n) from lanes of groups of wavelengths."""
+        found = evaluate.to_numpy(value, len(pairs))
+        groups = -(-len(self.channels) // len(found))
+        return (
+            found.reshape(len(found), groups, -1).swapaxes(0, 1).reshape(-1, len(pairs) // groups)[: len(self.channels)]
+        )
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """Pairs of directions on the device, which all numbers share: one group of wavelengths after the other."""
+
+    si: Any
+    wo: Any
+
+    @classmethod
+    def of(cls, data: BRDF) -> Lanes:
+        """Those of some data, opaque: they share compiled kernels with all others."""
+        wavelengths = data.wavelengths
+        count = dr.size_v(mi.UnpolarizedSpectrum)
+        groups = np.zeros((1, 0))
+        if wavelengths is not None:
+            groups = np.pad(wavelengths, (0, -len(wavelengths) % count), mode="edge").reshape(-1, count)
+        wi, wo = (evaluate.vectors(np.tile(w, (len(groups), 1))) for w in (data.wi, data.wo))
+        si = evaluate.interaction(wi, len(data) * len(groups))
+        if wavelengths is not None:
+            si.wavelengths = type(si.wavelengths)(*np.repeat(groups, len(data), axis=0).T.astype(np.float32))
+        dr.make_opaque(si, wo)
+        return cls(si, wo)
+
+    def __len__(self) -> int:
+        return dr.width(self.wo)
+
+
+def _key(parameters: Any, path: str) -> str:
+    """What ``mi.traverse`` calls a parameter of a description."""
+    *parents, name = path.split(".")
+    names = [path + ".value", path + ".values", path, ".".join([*parents, RENAMED.get(name, name)])]
+    return next(key for key in names if key in parameters)
+
+
+def _opaque(like: Any, value: Array) -> Any:
+    """Numbers in the type of a parameter, as a variable of which no constant is compiled."""
+    kind = type(like)
+    if not dr.is_array_v(kind):
+        return kind(value.ravel()[0])
+    if dr.size_v(kind) > 0:  # a colour
+        return kind(*(dr.opaque(mi.Float, float(x)) for x in np.broadcast_to(value, dr.size_v(kind))))
+    if len(value) == 1:
+        return kind(dr.opaque(mi.Float, float(value[0])))
+    return kind(np.asarray(value, dtype=np.float32))
