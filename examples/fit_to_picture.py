@@ -75,7 +75,7 @@ for axis, (title, panel) in zip(axes.flat, panels.items()):
     axis.set(title=title, xticks=[], yticks=[], facecolor="tab:blue")  # which shows where there is no number
 axes[1, 2].semilogy(losses)
 axes[1, 2].set(title="loss", xlabel="step")
-figure.savefig("fit_to_picture.png")
+figure.savefig("fit_to_picture.png", dpi=200)
 
 print(f"Of the filling factor of {seen.sum()} texels, the mean error was {before:.3f}, and is {after:.3f}.")
 print("The colour is", *(f"{x:.3f}" for x in colour), "where it was", *TRUE_COLOUR)
