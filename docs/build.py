@@ -7,6 +7,7 @@ file); the pictures on request: they take ten minutes.
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -343,6 +344,14 @@ def plots(folder: Path, page: Path = DOCS / "plotting.md") -> None:
                 shrink(Path(place, written.split()[-1]), folder / picture)
 
 
+def inverse(path: Path) -> None:
+    """The figure of the example that fits to a picture, half as wide."""
+    with TemporaryDirectory() as place:
+        example = DOCS.parent / "examples" / "fit_to_picture.py"
+        subprocess.run([sys.executable, str(example)], cwd=place, check=True, env=os.environ | {"MPLBACKEND": "Agg"})
+        shrink(Path(place, "fit_to_picture.png"), path)
+
+
 def shrink(source: Path, target: Path) -> None:
     """Write a picture half as wide, or narrower, until it is no larger than `LARGEST`; a PNG in 256 colours."""
     from PIL import Image
@@ -373,6 +382,7 @@ def main() -> None:
         moon(DOCS / "pictures" / "moon.png")
         figures(DOCS / "pictures")
         plots(DOCS / "pictures")
+        inverse(DOCS / "pictures" / "inverse.jpg")
         draw_sweeps(DOCS / "pictures" / "sweeps")
         patches(DOCS / "pictures" / "macbeth.png")
 

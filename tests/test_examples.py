@@ -11,6 +11,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 QUICK = ("slice", "dust")
+LONG = {"fit_to_picture": 100}
+"""Lines of those that do more than the others."""
 
 
 @pytest.mark.slow
@@ -37,5 +39,5 @@ def test_examples(tmp_path, path):
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_are_short_and_assert_something(path):
     lines = path.read_text().splitlines()
-    assert len(lines) < 40 and any(line.startswith("assert ") for line in lines)
+    assert len(lines) < LONG.get(path.stem, 40) and any(line.startswith("assert ") for line in lines)
     assert f"| `{path.name}` |" in (ROOT / "docs/python.md").read_text()
