@@ -34,10 +34,7 @@ def load(name: str) -> BRDF:
     from asperity import fitting
 
     of, _, material = name.partition("/")
-    if of == "merl":
-        found = network(material)
-    else:
-        found = fitting.data(next((FOLDER / of).glob(f"{material}.*")))
+    found = network(material) if of == "merl" else fitting.data(next((FOLDER / of).glob(f"{material}.*")))
     least = np.cos(np.radians(GRAZING)) - 1e-9
     return found.subset(np.flatnonzero((found.wi[:, 2] >= least) & (found.wo[:, 2] >= least)))
 

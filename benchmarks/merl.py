@@ -1,7 +1,7 @@
 """Fits all candidates to measured materials, and takes the errors of published fits to the same: `docs/fits.json`.
 
-    python benchmarks/merl.py --jobs 2 -o docs/fits.json                       # MERL, all candidates: hours on two cores
-    python benchmarks/merl.py --of rgl --of nist -o docs/fits.json             # the paints and the PTFE
+    python benchmarks/merl.py --jobs 2 -o docs/fits.json                   # MERL, all candidates: hours on two cores
+    python benchmarks/merl.py --of rgl --of nist -o docs/fits.json         # the paints and the PTFE
     python benchmarks/merl.py --materials chrome --models "twoscale,vgroove" -o chrome.json
 
 What the file has already is not done again, so that it may be interrupted, and it is written every half minute.

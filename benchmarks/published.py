@@ -1,8 +1,8 @@
 """Fits to MERL's materials that others have published, by the formulas of their papers: f in 1/sr, in NumPy.
 
-A fit is what `published_fits.json` has of a material: lobes, of which one is Lambertian. The lists come from the papers'
-supplements as B. Bitterli's and P. Peers' library has them (bsdfbenchmark/bbm), and so do the constants that differ
-from the papers: what a lobe is divided by. Each is the one that is nearest to the materials (docs/fitting-results.md).
+A fit is what `published_fits.json` has of a material: lobes, of which one is Lambertian. The numbers are those of the
+papers' supplements, as the library BBM (github.com/bsdfbenchmark/bbm) has them. The papers are not clear about what a
+lobe is divided by: it is what BBM takes, and what brings the fits nearest to the materials (docs/fitting-results.md).
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def low(lobe: Lobe, pairs: Pairs) -> Array:
 
 
 def bagher(lobe: Lobe, pairs: Pairs) -> Array:
-    """The shifted gamma distribution of M. Bagher et al. 2012, in each channel with its own masking and Fresnel term."""
+    """The shifted gamma distribution of M. Bagher et al. 2012, with masking and Fresnel terms of each channel."""
     names = ("albedo", "alpha", "p", "K", "Lambda", "c", "k", "theta0")
     albedo, alpha, p, scale, most, c, k, first = (np.asarray(lobe[name]) for name in names)
     shifted = alpha + pairs.slope2 / alpha
