@@ -35,8 +35,13 @@ def load(name: str) -> BRDF:
 
     of, _, material = name.partition("/")
     found = network(material) if of == "merl" else fitting.data(next((FOLDER / of).glob(f"{material}.*")))
+    return within(found)
+
+
+def within(brdf: BRDF) -> BRDF:
+    """Its pairs within `GRAZING` degrees."""
     least = np.cos(np.radians(GRAZING)) - 1e-9
-    return found.subset(np.flatnonzero((found.wi[:, 2] >= least) & (found.wo[:, 2] >= least)))
+    return brdf.subset(np.flatnonzero((brdf.wi[:, 2] >= least) & (brdf.wo[:, 2] >= least)))
 
 
 @cache
@@ -52,8 +57,8 @@ def published() -> dict[str, Any]:
     return dict(json.loads((FOLDER / "merl/published_fits.json").read_text()))
 
 
-def network(material: str) -> BRDF:
-    """A network at the nodes of MERL's grid, as a file of MERL has them."""
+def network(material: str, every: int = 1) -> BRDF:
+    """A network at the nodes of MERL's grid, as a file of MERL has them, or at one of so many."""
     nets = networks()
     number = list(nets["names"]).index(material)
     h, d, p = (np.arange(n) / n for n in merl.COUNTS)
@@ -61,7 +66,7 @@ def network(material: str) -> BRDF:
     theta_h, theta_d, phi_d = (angle.ravel() for angle in grid)
     wi, wo = merl.directions(theta_h, theta_d, phi_d)
     once = (theta_d > 0) | (phi_d == 0)  # at θ_d = 0 all φ_d are the same pair
-    kept = (wi[:, 2] > 0) & (wo[:, 2] > 0) & once
+    kept = np.flatnonzero((wi[:, 2] > 0) & (wo[:, 2] > 0) & once)[::every]
     theta_h, theta_d, phi_d = theta_h[kept], theta_d[kept], phi_d[kept]
     half = [np.sin(theta_h), np.zeros_like(theta_h), np.cos(theta_h)]
     difference = [np.sin(theta_d) * np.cos(phi_d), np.sin(theta_d) * np.sin(phi_d), np.cos(theta_d)]

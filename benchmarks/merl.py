@@ -2,7 +2,7 @@
 
     python benchmarks/merl.py --jobs 2 -o docs/fits.json                   # MERL, all candidates: hours on two cores
     python benchmarks/merl.py --of rgl --of nist -o docs/fits.json         # the paints and the PTFE
-    python benchmarks/merl.py --materials chrome --models "twoscale,vgroove" -o chrome.json
+    python benchmarks/merl.py --materials chrome --models twoscale "vgroove + diffuse" -o chrome.json
 
 What the file has already is not done again, so that it may be interrupted, and it is written every half minute.
 `python docs/build.py` makes the tables of docs/fitting-results.md from it.
@@ -55,10 +55,12 @@ def fitted(task: Task) -> dict[str, Any]:
     name, model = task
     found = fitting.fit(data(name), model)
     errors = found.errors
+    f = found.values.T / found.data.wo[:, 2:]
     return {
         "error": errors.log_cosine,
         "linear": errors.linear,
         "relative": errors.relative,
+        "f": np.sqrt(np.square(f - found.data.values).mean()),
         "bias": errors.bias,
         "aic": found.aic,
         "numbers": len(found.parameters),
@@ -93,8 +95,8 @@ def tasks(asked: argparse.Namespace) -> list[Task]:
 
     found = [name for of in asked.of or ["merl"] for name in materials.names(of)]
     if asked.materials:
-        found = [name for name in found if name.partition("/")[2] in asked.materials.split(",")]
-    models = asked.models.split(",") if asked.models else [*published.FITS, *CANDIDATES]
+        found = [name for name in found if name.partition("/")[2] in asked.materials]
+    models = asked.models or [*published.FITS, *CANDIDATES]
     return [(name, model) for name in found for model in models if model not in published.FITS or has(name, model)]
 
 
@@ -155,8 +157,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True, help="file with what was done, and will be")
     parser.add_argument("--of", action="append", choices=materials.SETS, help="sets of materials; default: merl")
-    parser.add_argument("--materials", help="some of them, between commas")
-    parser.add_argument("--models", help="some candidates or published fits, between commas")
+    parser.add_argument("--materials", nargs="+", help="some of them")
+    parser.add_argument("--models", nargs="+", help="some candidates or published fits")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--for", dest="seconds", type=float, default=np.inf, help="seconds, after which none is begun")
     parser.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba")

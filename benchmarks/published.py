@@ -2,7 +2,8 @@
 
 A fit is what `published_fits.json` has of a material: lobes, of which one is Lambertian. The numbers are those of the
 papers' supplements, as the library BBM (github.com/bsdfbenchmark/bbm) has them. The papers are not clear about what a
-lobe is divided by: it is what BBM takes, and what brings the fits nearest to the materials (docs/fitting-results.md).
+lobe is divided by: it is what BBM takes, and what brings the fits nearest to the materials, as
+`python benchmarks/published.py` shows.
 """
 
 from __future__ import annotations
@@ -102,3 +103,32 @@ def evaluate(fit: dict[str, Any], wi: Array, wo: Array) -> Array:
     """f (n, 3) of a fit."""
     pairs = Pairs(wi, wo)
     return np.sum([LOBES[lobe["type"]](lobe, pairs) for lobe in fit["lobes"]], axis=0)
+
+
+def factors(list_: str) -> Array:
+    """By what the specular lobes of all materials would have to be multiplied, to be nearest (materials,)."""
+    import materials
+    from scipy.optimize import minimize_scalar
+
+    found = []
+    for name in materials.names("merl"):
+        fit = materials.published()[list_].get(name.partition("/")[2])
+        if fit is None:
+            continue
+        data = materials.within(materials.network(name.partition("/")[2], every=127))
+        directions = Pairs(data.wi, data.wo)
+        body, shine = (LOBES[lobe["type"]](lobe, directions) for lobe in fit["lobes"])
+        measured = np.log1p(data.values * directions.o)
+
+        def error(x: float, body=body, shine=shine, o=directions.o, measured=measured, data=data) -> float:
+            squared = np.square(np.log1p((body + np.exp(x) * shine) * o) - measured)
+            return float(squared.mean(axis=1) @ data.weights)
+
+        found.append(np.exp(minimize_scalar(error, bounds=(-4, 4), method="bounded").x))
+    return np.array(found)
+
+
+if __name__ == "__main__":
+    for name, list_ in FITS.items():
+        quartiles = ", ".join(f"{q:.2f}" for q in np.percentile(factors(list_), (25, 50, 75)))
+        print(f"{name}: quartiles of the factor that its specular lobes lack: {quartiles}")
