@@ -50,7 +50,9 @@ def test_derivatives_are_those_of_differences(name):
     pairs = Lanes.of(data(CHANNELS["rgb"]))
     model = Model(CANDIDATES[name], free.parameters(CANDIDATES[name]), CHANNELS["rgb"])
     x = np.random.default_rng(5).uniform(0.35, 0.65, sum(model.sizes))
-    found = model.jacobian(model.derivatives(x, pairs))
+    value, derivatives = model.derivatives(x, pairs)
+    assert np.allclose(value, model(x, pairs), rtol=1e-5)
+    found = model.jacobian(derivatives)
     for k, row in enumerate(found):
         step = STEP * (np.arange(len(x)) == k)
         wanted = (model(x + step, pairs) - model(x - step, pairs)) / (2 * STEP)

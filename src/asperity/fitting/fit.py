@@ -25,6 +25,8 @@ from .search import Problem, search
 Array = NDArray[np.float64]
 PAIRS = 4096
 """That are fitted, of all: more would cost time, and tell little."""
+FEW = 1024
+"""Of these, that starts are compared by."""
 GRAZING = 85.0
 """Degrees: beyond, goniometers light or see more than the sample, and f grows without bound."""
 AT_ONCE = 2**18
@@ -88,7 +90,7 @@ def fit(
         target = Model(description, chosen, data.channels)
         small = drawn(kept, whole("pairs", pairs, 16), seed)
         problem = _problem(target, small, function)
-        complete = search(problem, seed, robust, progress)
+        complete = search(_problem(target, drawn(small, FEW, seed), function), problem, seed, robust, progress)
         found = _result(name, problem, kept, small)
         return replace(found, loss=loss, complete=complete, seconds=time.monotonic() - began)
 

@@ -36,6 +36,7 @@ class Model:
         self.bsdf = loading.load(self.description)
         self.parameters = mi.traverse(self.bsdf)
         self.keys = [_key(self.parameters, one.path) for one in free]
+        self.current: dict[str, Array] = {}
 
     def split(self, x: Array) -> list[Array]:
         """The numbers of each parameter."""
@@ -50,9 +51,36 @@ class Model:
         self._set(x)
         return self._ordered(self._eval(pairs), pairs)
 
-    def derivatives(self, x: Array, pairs: Lanes) -> Array:
-        """Of the values by each parameter (parameters, channels, n); channels of a colour do not mix."""
-        return np.stack([self._derivative(x, k, pairs) for k in range(len(self.free))])
+    def derivatives(self, x: Array, pairs: Lanes) -> tuple[Array, Array]:
+        """Values, and their derivatives by each parameter (parameters, channels, n); a colour's channels do not mix.
+
+        All are of one graph and one kernel: what they share is traced and computed once.
+        """
+        self._set(x)
+        units = self.split(x)
+        smooth = [k for k, key in enumerate(self.keys) if self._differentiable(key)]
+        for k in smooth:
+            parameter = self.parameters[self.keys[k]]
+            dr.enable_grad(parameter)
+            self.parameters[self.keys[k]] = parameter
+        self.parameters.update()
+        value = self._eval(pairs)
+        found: list[Any] = [None] * len(self.free)
+        for k in smooth:
+            parameter, one = self.parameters[self.keys[k]], self.free[k]
+            dr.set_grad(parameter, _opaque(parameter, one.slope(one.value(units[k]))))
+            found[k] = dr.forward_to(value, flags=dr.ADFlag.ClearInterior)
+            dr.clear_grad(value)
+            dr.set_grad(parameter, 0)
+        value = dr.detach(value)
+        dr.eval(value, found)
+        for k in smooth:
+            dr.disable_grad(self.parameters[self.keys[k]])
+        self.current = {key: old for key, old in self.current.items() if key not in [self.keys[k] for k in smooth]}
+        rows = [
+            self._difference(x, k, pairs) if one is None else self._ordered(one, pairs) for k, one in enumerate(found)
+        ]
+        return self._ordered(value, pairs), np.stack(rows)
 
     def jacobian(self, derivatives: Array) -> Array:
         """By each number (numbers, channels, n): a colour's number of a channel moves that channel only."""
@@ -61,20 +89,14 @@ class Model:
             rows += [row * (np.arange(len(row)) == k)[:, None] for k in range(len(row))] if one.colour else [row]
         return np.stack(rows)
 
-    def _derivative(self, x: Array, k: int, pairs: Lanes) -> Array:
-        key, one = self.keys[k], self.free[k]
-        if not self.parameters.flags(key) & int(mi.ParamFlags.NonDifferentiable) and key.endswith(("value", "values")):
-            self._set(x)
-            parameter = self.parameters[key]
-            dr.enable_grad(parameter)
-            dr.set_grad(parameter, _opaque(parameter, one.slope(one.value(self.split(x)[k]))))
-            self.parameters[key] = parameter
-            self.parameters.update()
-            value = self._eval(pairs)
-            found = self._ordered(dr.forward_to(value), pairs)
-            dr.disable_grad(parameter)
-            return found
-        place = sum(self.sizes[:k]) + np.arange(self.sizes[k])
+    def _differentiable(self, key: str) -> bool:
+        """Whether Mitsuba has derivatives by a parameter."""
+        never = int(mi.ParamFlags.NonDifferentiable)
+        return not self.parameters.flags(key) & never and key.endswith(("value", "values"))
+
+    def _difference(self, x: Array, k: int, pairs: Lanes) -> Array:
+        """The central difference by a parameter, within its range."""
+        one, place = self.free[k], sum(self.sizes[:k]) + np.arange(self.sizes[k])
         ends = []
         for step in (STEP, -STEP):
             moved = np.array(x, dtype=np.float64)
@@ -84,8 +106,11 @@ class Model:
         return (above - below) / (high - low)
 
     def _set(self, x: Array) -> None:
+        """Bring the parameters up to date, of which those that are stay untouched: tables may be made of them."""
         for key, value in zip(self.keys, self.values(x).values()):
-            self.parameters[key] = _opaque(self.parameters[key], value)
+            if not np.array_equal(self.current.get(key, np.nan), value):
+                self.parameters[key] = _opaque(self.parameters[key], value)
+                self.current[key] = value
         self.parameters.update()
 
     def _eval(self, pairs: Lanes) -> Any:

@@ -16,7 +16,7 @@ from .residuals import Lanes, Model
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
-SOBOL = 32
+SOBOL = 64
 """Points that are looked at."""
 FOLLOWED = 4
 """The best of them, which are followed for some steps."""
@@ -49,8 +49,8 @@ class Problem:
 
     def jacobian(self, x: Array) -> Array:
         """Of the residuals (residuals, numbers)."""
-        slope = self.scale * self.loss.slope(self.model(x, self.pairs))
-        rows = self.model.jacobian(self.model.derivatives(x, self.pairs)) * slope
+        value, derivatives = self.model.derivatives(x, self.pairs)
+        rows = self.model.jacobian(derivatives) * self.scale * self.loss.slope(value)
         return np.nan_to_num(rows.reshape(len(rows), -1).T, nan=0.0, posinf=0.0, neginf=0.0)
 
 
@@ -77,45 +77,47 @@ def starts(model: Model, seed: int) -> Array:
     return np.clip(np.repeat(np.vstack([first, points]), model.sizes, axis=1), low, high)
 
 
-def search(problem: Problem, seed: int, robust: str, progress: Progress) -> bool:
-    """Leave the best in ``problem``; True if nobody interrupted it with Ctrl-C, which keeps what was found."""
-    low, high = bounds(problem.model)
-    margin = 1e-9 * (high - low)
-    first = starts(problem.model, seed)
+def search(few: Problem, whole: Problem, seed: int, robust: str, progress: Progress) -> bool:
+    """Leave the best in ``whole``: starts are compared and followed with ``few`` pairs, which the model shares.
+
+    True if nobody interrupted it with Ctrl-C, which keeps what was found.
+    """
+    first = starts(few.model, seed)
     total, done = len(first) + FOLLOWED * STEPS + LAST, 0
 
-    def follow(x: Array, most: int, width: float) -> Any:
+    def follow(problem: Problem, x: Array, most: int) -> Any:
+        low, high = bounds(problem.model)
+        margin = 1e-9 * (high - low)
         return least_squares(
-            counted,
+            lambda x: counted(problem, x),
             np.clip(x, low + margin, high - margin),
             problem.jacobian,
             bounds=(low, high),
             loss=robust,
-            f_scale=width,
+            f_scale=_width(problem, x, robust),
             max_nfev=most,
             ftol=TOLERANCE,
             xtol=TOLERANCE,
             gtol=TOLERANCE,
         )
 
-    def counted(x: Array) -> Array:
+    def counted(problem: Problem, x: Array) -> Array:
         nonlocal done
         done += 1
         progress("fitting", min(done, total - 1), total)
         return problem.residuals(x)
 
     try:
-        costs = [float(np.square(counted(x)).sum()) for x in first]
-        order = np.argsort(costs)[:FOLLOWED]
-        width = _width(problem, first[order[0]], robust)
+        costs = [float(np.square(counted(few, x)).sum()) for x in first]
         found = []
-        for k in order:
-            found.append(follow(first[k], STEPS, width))
+        for k in np.argsort(costs)[:FOLLOWED]:
+            found.append(follow(few, first[k], STEPS))
             done = max(done, len(first) + STEPS * len(found))
-        best = min(found, key=lambda one: one.cost).x
-        problem.best = follow(best, LAST, _width(problem, best, robust)).x
+        best = min(found, key=lambda one: one.cost)
+        whole.best = follow(whole, best.x, LAST).x
     except KeyboardInterrupt:
-        if problem.best is None:
+        whole.best = few.best if whole.best is None else whole.best
+        if whole.best is None:
             raise
         return False
     progress("fitting", total, total)
