@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.fitting.fit import GRAZING
 from asperity.measured import BRDF, merl
@@ -34,14 +36,31 @@ def load(name: str) -> BRDF:
     from asperity import fitting
 
     of, _, material = name.partition("/")
-    found = network(material) if of == "merl" else fitting.data(next((FOLDER / of).glob(f"{material}.*")))
-    return within(found)
+    if of == "merl":
+        return within(network(material))
+    path = next((FOLDER / of).glob(f"{material}.*"))
+    found = within(fitting.data(path))
+    return replace(found, weights=solid_angles(path, found)) if of == "rgl" else found
 
 
 def within(brdf: BRDF) -> BRDF:
     """Its pairs within `GRAZING` degrees."""
     least = np.cos(np.radians(GRAZING)) - 1e-9
     return brdf.subset(np.flatnonzero((brdf.wi[:, 2] >= least) & (brdf.wo[:, 2] >= least)))
+
+
+def solid_angles(path: Path, brdf: BRDF) -> NDArray[np.float64]:
+    """dω_i dω_o of vertices of RGL (n,), up to a factor: the file's samples are as dense as the plugin draws them."""
+    import mitsuba as mi
+
+    from asperity.lab import evaluate
+
+    si, wo = evaluate.interaction(evaluate.vectors(brdf.wi), len(brdf)), evaluate.vectors(brdf.wo)
+    density = np.array(evaluate.load({"type": "measured", "filename": str(path)}).pdf(mi.BSDFContext(), si, wo))
+    rings, ring = np.unique(np.radians(brdf.incident[:, 0]).round(4), return_inverse=True)
+    width = np.gradient(rings)
+    incident = np.sin(np.maximum(rings, width / 4)) * width
+    return np.where(density > 0, incident[ring] / np.maximum(density, 1e-9), 0)
 
 
 @cache
