@@ -58,3 +58,12 @@ def test_derivatives_are_those_of_differences(name):
         wanted = (model(x + step, pairs) - model(x - step, pairs)) / (2 * STEP)
         # Derivatives of tables are good to 3 % of the largest, and single precision allows no smaller steps.
         assert np.allclose(row, wanted, rtol=0.05, atol=0.03 * np.abs(wanted).max() + 1e-5), model.free
+
+
+@pytest.mark.parametrize("name", CANDIDATES)
+def test_all_parameters_of_all_candidates_are_found_in_spectra(name):
+    """Of two spectra with equal values Mitsuba makes one object, which is traversed once."""
+    mi.set_variant("llvm_ad_spectral")
+    description, channels = CANDIDATES[name], CHANNELS["spectral"]
+    chosen = free.chosen(free.parameters(description), None, ())
+    assert len(set(Model(description, chosen, channels).keys)) == len(chosen)

@@ -31,7 +31,10 @@ class Model:
     def __init__(self, description: dict[str, Any], free: list[Free], channels: tuple[str, ...]):
         self.free, self.channels = free, channels
         self.sizes = [len(self.channels) if one.colour else 1 for one in free]
-        middle = {one.path: np.full(n, float(one.value(0.5))) for one, n in zip(free, self.sizes)}
+        # All different: of two equal spectra Mitsuba makes one, and the second parameter would be none.
+        middle = {
+            one.path: np.full(n, float(one.value(0.5 + 1e-3 * k))) for k, (one, n) in enumerate(zip(free, self.sizes))
+        }
         self.description = described(description, middle, self.channels)
         self.bsdf = loading.load(self.description)
         self.parameters = mi.traverse(self.bsdf)
