@@ -10,11 +10,15 @@ import typer
 from rich.table import Table
 
 from asperity.errors import ParameterError
+from asperity.materials import changed, resolve
 
 from . import console, output, passes, variants
+from .compare import previews
+from .plot import is_text, suited
 
 if TYPE_CHECKING:
     from asperity.fitting import Fit
+    from asperity.materials import Material
     from asperity.measured import BRDF
 
 ALL = "all"
@@ -29,7 +33,7 @@ def names(text: str | None) -> list[str] | None:
 
 def fit(
     ctx: typer.Context,
-    data: Annotated[Path, typer.Argument(metavar="DATA", help="Measured: .binary, .bsdf, .csv, .npz.")],
+    data: Annotated[str, typer.Argument(metavar="DATA", help="Measured: .binary, .bsdf, .csv, .npz; or any material.")],
     model: Annotated[
         str, typer.Option("--model", help="A model, a preset, a file, JSON; all compares what there is.")
     ] = ALL,
@@ -51,7 +55,12 @@ def fit(
     ] = None,
     pairs: Annotated[int, typer.Option("--pairs", help="How many pairs of directions are fitted.")] = 4096,
     seed: Annotated[int, typer.Option("--seed", help="Of the drawing of pairs, and of the starts.")] = 0,
+    columns: Annotated[
+        list[str] | None,
+        typer.Option("--column", metavar="NAME=COLUMN", help="What a CSV calls theta_i, phi_o, value. Repeatable."),
+    ] = None,
     plot: Annotated[bool, typer.Option(help="Draw the residuals, too.")] = True,
+    preview: Annotated[bool, typer.Option(help="And render data and model.")] = True,
     json_: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
     variant: variants.Variant = None,
     out: Annotated[
@@ -63,25 +72,27 @@ def fit(
 
     It writes a material file, which render, plot and compare take, and a figure of the residuals.
     """
-    from asperity.materials import changed
-
     fixed = changed({}, fix or [])
-    default = Path(f"{data.stem}-{label(model)}.json")
-    [path] = ctx.with_resource(output.files(out, default, FORMATS, force=force, inputs=[data, model]))
-    figures = output.files(path.with_suffix(".png"), default, FIGURES, force=force or out is None)
+    default = Path(f"{label(data)}-{label(model)}.json")
+    inputs = [text if is_text(text) else Path(text) for text in (data, model)]
+    [path] = ctx.with_resource(output.files(out, default, FORMATS, force=force, inputs=inputs))
+    figures = output.files(path.with_suffix(".png"), default, FIGURES, force=force)
     picture = ctx.with_resource(figures)[0] if plot else None
     with console.status("reading"):
-        variants.choose(variant)
+        material = read(data, columns)
+        variants.choose(variant or suited([material]))
         from asperity import drawing, fitting
 
-        measured = fitting.data(data)
+        measured = fitting.data(material)
     options: dict[str, Any] = {"plus": plus, "free": names(free), "fix": fixed, "loss": loss, "robust": robust}
     options |= {"grazing": grazing, "saturation": saturation, "pairs": pairs, "seed": seed}
     ranked = followed(measured, model, options)
     best = ranked[0]
     best.save(path)
     if picture is not None:
-        drawing.style.save(best.plot(), picture)
+        with console.status("drawing"):
+            rendered = previews(material, resolve(best.material)) if preview else None
+            drawing.style.save(best.plot(rendered), picture)
     if json_:
         numbers = [one.numbers() for one in ranked]
         typer.echo(json.dumps(numbers if model == ALL else numbers[0], indent=2))
@@ -94,10 +105,18 @@ def fit(
             typer.echo(written)
 
 
-def label(model: str) -> str:
-    """What to call the results of a model: its name, or that of its file."""
-    text = model.lstrip()[:1] in ("{", "[", "<")
-    return "fit" if text else Path(model).stem.replace(" ", "").replace(",", "-")
+def label(what: str) -> str:
+    """What to call data or a model in the names of files: its name, or that of its file."""
+    return "fit" if is_text(what) else Path(what).stem.replace(" ", "").replace(",", "-")
+
+
+def read(data: str, columns: list[str] | None) -> Material:
+    """The data, a material like any other; with the columns of a CSV that the user named."""
+    if not columns:
+        return resolve(data)
+    from asperity import measured
+
+    return resolve(measured.load(data, columns=dict(column.partition("=")[::2] for column in columns)))
 
 
 def followed(data: BRDF, model: str, options: dict[str, Any]) -> list[Fit]:

@@ -54,7 +54,7 @@ def figure(materials: Sequence[Material], found: Comparison, previews: Previews 
         maps(materials, found, incident[len(incident) // 2], next(parts).subplots(1, 3))
     slices_and_albedo(materials, found, incident, next(parts))
     if previews is not None:
-        pictures(materials, previews, next(parts))
+        pictures([material.name for material in materials], previews, next(parts))
     return made
 
 
@@ -120,11 +120,11 @@ def slices_and_albedo(materials: Sequence[Material], found: Comparison, incident
     style.legend(figure, places)
 
 
-def pictures(materials: Sequence[Material], previews: Previews, figure: Any) -> None:
+def pictures(names: Sequence[str], previews: Previews, figure: Any) -> None:
     """Fill a row: both previews, their difference, and FLIP's map if there is one."""
     places = figure.subplots(1, 4)
-    for axes, material, image in zip(places, materials, (previews.a, previews.b)):
-        _picture(axes, image, material.name)
+    for axes, name, image in zip(places, names, (previews.a, previews.b)):
+        _picture(axes, image, name)
     top = max(float(np.quantile(previews.difference, 0.999)), 1e-3)
     shown = [(previews.difference, f"difference, mean {previews.difference.mean():.3g}", top)]
     if previews.flip is not None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 
 from asperity.measured import BRDF, merl
 
-from . import style
+from . import comparison, style
+from .comparison import Previews
 
 BINS = 45
 """Along either angle, at most; those of θ_h are narrow at highlights, as MERL's are."""
@@ -16,15 +17,30 @@ EACH = 12
 """Pairs that a bin has on average, at least, where data are few."""
 
 
-def figure(name: str, data: BRDF, values: np.ndarray) -> Figure:
-    """Of the data, a model's ``values`` f cosθ_o (channels, n) there, and their difference in ln(1 + f cosθ_o)."""
+def figure(name: str, data: BRDF, values: np.ndarray, previews: Previews | None = None) -> Figure:
+    """Of the data, a model's ``values`` f cosθ_o (channels, n) there, and their difference in ln(1 + f cosθ_o).
+
+    With ``previews``, of data and model, they come below.
+    """
+    made = style.figure(style.PAGE, 2.5 if previews is None else 4.6)
+    rows = made.subfigures(
+        1 if previews is None else 2, 1, squeeze=False, height_ratios=None if previews is None else (2.5, 2.1)
+    )
+    maps(name, data, values, rows[0, 0])
+    if previews is not None:
+        comparison.pictures((data.source or "data", name), previews, rows[1, 0])
+    return made
+
+
+def maps(name: str, data: BRDF, values: np.ndarray, made: FigureBase) -> None:
+    """Fill three axes."""
     measured = data.values.T * data.wo[:, 2]
-    maps = [over_angles(data, one.mean(axis=0)) for one in (measured, values)]
+    found = [over_angles(data, one.mean(axis=0)) for one in (measured, values)]
     difference = over_angles(data, (np.log1p(np.maximum(values, 0)) - np.log1p(np.maximum(measured, 0))).mean(axis=0))
-    made, places = style.panels(3, 2.5, sharey=True)
-    norm = style.norm(maps, "log")
+    places = made.subplots(1, 3, sharey=True)
+    norm = style.norm(found, "log")
     end = float(max(np.nanquantile(np.abs(difference), 0.98), 1e-4))
-    shown = [(maps[0], data.source or "data", norm, style.MAP), (maps[1], name, norm, style.MAP)]
+    shown = [(found[0], data.source or "data", norm, style.MAP), (found[1], name, norm, style.MAP)]
     shown.append((difference, "model less data", Normalize(-end, end), style.DIFFERENCES))
     for axes, (map, title, scale, colours) in zip(places, shown):
         edges_h, edges_d = edges(len(map.T), len(map))
@@ -39,7 +55,6 @@ def figure(name: str, data: BRDF, values: np.ndarray) -> Figure:
     places[0].set_ylabel(r"$\theta_d$ [°]")
     label = r"difference of $\ln(1 + f\,\cos\theta_o)$"
     made.colorbar(image, ax=places[2], label=label, fraction=0.05, pad=0.02, extend="both")
-    return made
 
 
 def edges(columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,40 +1,29 @@
-"""What a person may call data: a file, a measurement, a container."""
+"""What a person may call data: a measurement, in a file or not; or any other material, at the nodes of a grid."""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any
 
 from .. import measured, variants
-from ..errors import ParameterError
-from ..goniophotometer import Measurement
-from ..measured import BRDF
+from ..materials import resolve
+from ..measured import BRDF, conversion
 
-MODES = ("rgb", "spectral")
-"""Of files of RGL, which Mitsuba reads in a variant with their channels only."""
+STEPS = 60
+"""Of θ_h, at which a material that is no measurement is sampled."""
 
 
-def data(what: Any, **options: Any) -> BRDF:
-    """A `BRDF` of a file that `measured.load` reads, of what the goniophotometer measured, or itself.
+def data(what: Any) -> BRDF:
+    """A `BRDF` of anything that `materials.resolve` takes, or itself; raises what that raises.
 
-    ``options`` are those of `measured.load`. Raises UnreadableFileError, ParameterError.
+    What was measured comes in the pairs of directions in which it was, a file of RGL's at the vertices of its table.
     """
     if isinstance(what, BRDF):
         return what
-    if isinstance(what, Measurement):
-        return measured.from_measurement(what)
-    if not isinstance(what, (str, os.PathLike)):
-        raise ParameterError(f"data: expected a file or a measurement, not a {type(what).__name__}.")
-    path = Path(what)
-    if path.suffix.lower() not in measured.rgl.FORMATS:
-        return measured.load(path, **options)
-    for mode in MODES:
-        with variants.switched(variants.with_channels(variants.of_arrays(), mode)):
-            try:
-                return measured.load(path, **options)
-            except ParameterError as error:
-                failed = error
-                if not str(error).startswith("variant "):
-                    raise
-    raise failed
+    material = resolve(what)
+    pairs = material.pairs
+    if pairs is not None:
+        return pairs
+    with variants.switched(variants.of_bsdf(material)):
+        if (material.description or {}).get("type") == "measured":
+            return measured.load(material.description["filename"])  # type: ignore[index]
+        return conversion.nodes(material.function(), STEPS)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .. import drawing
 from ..drawing import residuals
+from ..drawing.comparison import Previews
 from ..files import atomically
 from ..measured import BRDF
 from . import losses
@@ -131,10 +132,10 @@ class Fit:
         with atomically(Path(path)) as part:
             part.write_text(json.dumps(content | {"fit": self.numbers()}, indent=2) + "\n", encoding="utf-8")
 
-    def plot(self) -> Figure:
-        """A figure: data, model, and their difference over θ_h and θ_d."""
+    def plot(self, previews: Previews | None = None) -> Figure:
+        """A figure: data, model, and their difference over θ_h and θ_d; and ``previews`` of both, if there are."""
         with drawing.style.applied():
-            return residuals.figure(self.name, self.data, self.values)
+            return residuals.figure(self.name, self.data, self.values, previews)
 
 
 def _finite(value: float) -> float | None:
