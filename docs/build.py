@@ -1,7 +1,7 @@
 """Writes what in the documentation comes from the code: `python docs/build.py [--pictures]`.
 
-The parameter tables, and those of speed from `speed.json`, always (a test holds them to the declarations and to that
-file); the pictures on request: they take ten minutes.
+The parameter tables, and those of `speed.json` and `fits.json`, always (a test holds them to the declarations and to
+those files); the pictures on request: they take ten minutes.
 """
 
 from __future__ import annotations
@@ -367,6 +367,8 @@ def shrink(source: Path, target: Path) -> None:
 
 def main() -> None:
     """Write the tables, and the pictures if asked."""
+    import fitted
+
     import asperity  # noqa: F401  (before Mitsuba)
     from asperity.models import MODELS
 
@@ -376,6 +378,8 @@ def main() -> None:
         page.write_text(with_sweeps(with_speed(with_table(page.read_text(), model), name, report), name))
     page = DOCS / "which.md"
     page.write_text(between(with_costs(page.read_text(), report), BEGIN_KEPT, kept_table(), END_KEPT))
+    page = DOCS / "fitting-results.md"
+    page.write_text(fitted.filled(page.read_text()))
     if "--pictures" in sys.argv[1:]:
         strip(DOCS / "pictures" / "presets.png")
         gallery(DOCS / "pictures" / "gallery")

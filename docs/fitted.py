@@ -9,7 +9,8 @@ from statistics import median
 from typing import Any
 
 RESULTS = Path(__file__).parent / "fits.json"
-PUBLISHED = ("Ngan 2005", "Löw 2012", "Bagher 2012")
+PUBLISHED = {"Ngan 2005": 8, "Löw 2012": 9, "Bagher 2012": 18}
+"""Fits by others, and how many numbers each has."""
 Fits = dict[str, dict[str, Any]]
 
 
@@ -58,20 +59,22 @@ def materials(results: dict[str, Fits]) -> str:
 
 
 def models(results: dict[str, Fits]) -> str:
-    """A row a model: how near it is to MERL's materials, and how often it is the nearest of all."""
+    """A row a model: how near it is to the materials that all were fitted to, and to all that it was fitted to."""
     found = of(results, "merl")
-    winners = [found_best[0] for fits in found.values() if (found_best := best(fits, [*ours(), *mitsubas(fits)]))]
+    names = list(dict.fromkeys(m for fits in found.values() for m in fits))
+    candidates = [m for m in names if m not in PUBLISHED]
+    winners = [won[0] for fits in found.values() if (won := best(fits, candidates))]
+    common = [fits for fits in found.values() if set(candidates) <= fits.keys()]
     rows = []
-    for model in dict.fromkeys(m for fits in found.values() for m in fits):
-        fits = [one[model] for one in found.values() if model in one]
-        errors = sorted(fit["error"] for fit in fits)
-        numbers = "" if model in PUBLISHED else str(fits[0]["numbers"])
+    for model in names:
+        fits, few = ([one[model] for one in group if model in one] for group in (found.values(), common))
+        numbers = PUBLISHED.get(model) or fits[0]["numbers"]
+        medians = [f"{median(fit['error'] for fit in group):.4f}" if group else "" for group in (few, fits)]
         first = "" if model in PUBLISHED else str(winners.count(model))
-        quartiles = [f"{errors[round(q * (len(errors) - 1))]:.4f}" for q in (0.25, 0.75)]
-        rows.append([model, numbers, str(len(errors)), f"{median(errors):.4f}", " to ".join(quartiles), first])
-    return table(
-        ["model", "numbers", "materials", "median error", "quartiles", "nearest"], sorted(rows, key=lambda r: r[3])
-    )
+        rows.append([model, str(numbers), *medians, str(len(fits)), first])
+    rows.sort(key=lambda row: row[2])
+    heads = ["model", "numbers", f"median error, of {len(common)}", "of all", "materials", "nearest"]
+    return table(heads, rows)
 
 
 def goals(results: dict[str, Fits]) -> str:
