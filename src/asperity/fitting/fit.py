@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -85,7 +86,8 @@ def fit(
     kept = _kept(data, grazing, saturation)
     name, description = candidates.description(model, plus)
     description = changed(description, dict(fix or {}))
-    with variants.switched(variants.with_channels(variants.of_arrays(), data.mode)):
+    with variants.switched(variants.with_channels(variants.of_arrays(), data.mode)), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # models say of unusual values what they cost, and a search tries all
         chosen = parameters.chosen(parameters.parameters(description, data.isotropic), free, fix or ())
         target = Model(description, chosen, data.channels)
         small = drawn(kept, whole("pairs", pairs, 16), seed)

@@ -47,6 +47,8 @@ MITSUBA: dict[str, dict[str, tuple[Usual, tuple[float, float], bool]]] = {
     "blendbsdf": {"weight": (SHARE, (0, 1), False)},
 }
 """Mitsuba's plugins do not declare what is usual: usual and allowed range, and whether it is a colour, by parameter."""
+BEYOND = 10
+"""Of usual values, which a fit may leave; but a roughness of 700 explains nothing."""
 DENSER = 1.001
 """Than air: indices of refraction of what is measured."""
 NEVER = ("ext_ior",)
@@ -127,8 +129,17 @@ def _declared(node: Description, isotropic: bool) -> Iterator[Free]:
             steep = getattr(parameter, "steep", False)
             low = max(low, 1e-4) if usual[name].logarithmic else low
             low = max(low, DENSER) if isinstance(parameter, Ior) else low
+            low, high = max(low, unusual(usual[name])[0]), min(high, unusual(usual[name])[1])
             colour = isinstance(parameter, Spectrum) or parameter.kind == "conductor"
             yield Free(name, usual[name], low, high - inner * steep, colour, _start(node.get(name)))
+
+
+def unusual(usual: Usual) -> tuple[float, float]:
+    """How far from what is usual a fit may go: as far again, or by a factor of `BEYOND`."""
+    if usual.logarithmic:
+        return usual.low / BEYOND, usual.high * BEYOND
+    width = usual.high - usual.low
+    return usual.low - width, usual.high + width
 
 
 def _known(node: Description) -> Iterator[Free]:
