@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from asperity.measured import merl
+from asperity.measured.brdf import ABOVE
 
 FOLDER = Path(os.environ.get("ASPERITY_MEASURED", Path(__file__).parents[3] / "shared/data/measured"))
 SMALL = (8, 6, 10)
@@ -29,6 +30,6 @@ def glossy(wi, wo):
 def merl_file(path, f=glossy, counts=SMALL):
     """A file in which ``f`` is tabulated; returns its path."""
     wi, wo = merl.nodes(counts)
-    above = (wi[:, 2:] > 0) & (wo[:, 2:] > 0)
+    above = (wi[:, 2:] > ABOVE) & (wo[:, 2:] > ABOVE)
     merl.write(np.where(above, f(wi, wo), np.nan).reshape(*counts, 3), path)
     return path

@@ -4,11 +4,13 @@ import asperity  # noqa: F401  isort: skip
 import mitsuba as mi
 import numpy as np
 import pytest
-from data import SMALL, glossy, merl_file
+from data import glossy, merl_file
+from test_brdf import traced
 from test_functions import RGB, streak
 
 from asperity import loading
 from asperity.errors import ParameterError
+from asperity.goniophotometer import Hemisphere
 from asperity.lab import evaluate
 from asperity.materials import resolve
 from asperity.measured import convert, functions, load, merl
@@ -47,24 +49,41 @@ def test_a_finer_file_is_better(rgb, tmp_path, ending):
 
 @pytest.mark.parametrize("route", [(".csv",), (".npz",), (".csv", ".npz"), (".npz", ".csv")])
 def test_a_merl_file_comes_back_from_pairs(tmp_path, route):
-    """Nine digits in CSV; nodes of one pair, at θ_h = 0, may all have its value where one was below the horizon."""
-    path = merl_file(tmp_path / "x.binary")
-    for n, ending in enumerate([*route, ".binary"]):
-        data, path = load(path), tmp_path / f"{n}{ending}"
-        told = convert(of_brdf(data), path, data, resolution=SMALL[0] if ending == ".binary" else None)
-    assert path.exists() and told.relative[2] < 0.2
-    if merl.COUNTS != SMALL:
-        again = of_brdf(load(tmp_path / f"{len(route) - 1}{route[-1]}"))
-        wi, wo = load(tmp_path / "x.binary").wi, load(tmp_path / "x.binary").wo
-        assert np.allclose(again(wi, wo), load(tmp_path / "x.binary").values, rtol=1e-6)
-
-
-def test_a_merl_file_on_its_own_grid_is_the_same_bytes(tmp_path):
+    """Values have nine digits in CSV, and every node keeps its own."""
     path = merl_file(tmp_path / "x.binary", counts=(8, 8, 16))
-    data = load(path)
-    told = convert(of_brdf(data), tmp_path / "y.binary", data, resolution=8)
-    assert np.allclose(merl.read(tmp_path / "y.binary"), merl.read(path), rtol=1e-9)
-    assert told.relative[2] < 1e-9
+    first, data = merl.read(path), load(path)
+    for n, ending in enumerate(route):
+        told = convert(of_brdf(data), tmp_path / f"{n}{ending}", data)
+        assert told.relative[2] < 1e-6 and told.scattered is None
+        data = load(tmp_path / f"{n}{ending}")
+    assert convert(of_brdf(data), tmp_path / "y.binary", data, resolution=8).relative[2] < 1e-9
+    again = merl.read(tmp_path / "y.binary")
+    known = first >= 0
+    assert np.allclose(again[known], first[known], rtol=1e-8)
+    assert (again[1:][~known[1:]] < 0).all()  # at θ_h = 0 all φ_d are the same pair
+
+
+def test_a_measurement_of_the_virtual_goniophotometer(rgb, tmp_path):
+    """Its cells become pairs as they are, or a table; of a constant, on which interpolation is exact but for cosines
+    that are linear between 0, 40 and 80 degrees, in the table that renders it."""
+    measured = traced(Hemisphere(8, 16), 0.25, [(0, 0), (40, 0), (80, 0)])
+    found = resolve(measured)
+    convert(found.function(), tmp_path / "x.csv", found.pairs)
+    assert len(load(tmp_path / "x.csv")) == 3 * 128
+    told = convert(found.function(), tmp_path / "x.bsdf", resolution=30)
+    assert told.relative[0] < 0.02
+
+
+def test_what_is_not_its_own_mirror_image_stays_so(rgb, tmp_path):
+    """Isotropic, and the sense of rotation from wi to wo counts: MERL's φ_d tells it, and so does a table."""
+
+    def f(wi, wo):
+        return 0.2 + 0.1 * np.cross(wi, wo)[:, 2:] * np.sign(wi[:, 2:] - wo[:, 2:]) * np.abs(wi - wo)[:, 2:] * np.ones(
+            3
+        )
+
+    told = [convert(Function(f, RGB), tmp_path / f"x{ending}", resolution=30) for ending in (".binary", ".bsdf")]
+    assert max(one.relative[0] for one in told) < 0.005
 
 
 def test_other_programs_get_the_counts_that_they_read(rgb, tmp_path):

@@ -85,6 +85,11 @@ def test_a_bsdf_is_its_values_without_the_cosine(rgb):
     assert of_bsdf(evaluate.load({"type": "roughconductor", "alpha": 0.02})).isotropic
 
 
+def test_what_has_no_values_is_refused(rgb):
+    with pytest.raises(ParameterError, match="all mirror"):
+        of_bsdf(evaluate.load({"type": "conductor"}))
+
+
 def test_a_bsdf_at_any_number_of_wavelengths():
     import mitsuba as mi
 

@@ -9,6 +9,7 @@ from data import SMALL, glossy, merl_file
 
 from asperity.errors import UnreadableFileError
 from asperity.measured import merl
+from asperity.measured.brdf import ABOVE
 
 
 def pairs(n, lowest=0.02):
@@ -47,7 +48,7 @@ def test_pairs_below_the_horizon_and_negative_ones_are_counted(tmp_path):
 
     found = merl.load(merl_file(tmp_path / "x.binary", f))
     wi, wo = merl.nodes(SMALL)
-    above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
+    above = (wi[:, 2] > ABOVE) & (wo[:, 2] > ABOVE)
     assert found.left_out == {
         "below the horizon": (~above).sum(),
         "negative": (above & (wi[:, 0] > 0.5)).sum(),

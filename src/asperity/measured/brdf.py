@@ -13,6 +13,8 @@ from ..errors import ParameterError
 from ..goniophotometer import Measurement
 
 Array = NDArray[np.float64]
+ABOVE = 1e-9
+"""Cosines of directions above the surface are larger; what is nearer to the horizon is on it, but for rounding."""
 LARGEST = 1e30
 """Of numbers: what is beyond would overflow."""
 UNIT = 1e-3

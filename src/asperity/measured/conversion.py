@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import ParameterError, whole
 from ..goniophotometer import tensor_file
 from . import archive, functions, goniometer, merl
-from .brdf import BRDF, Array
+from .brdf import ABOVE, BRDF, Array
 from .functions import Function
 
 FORMATS = (".binary", ".bsdf", ".csv", ".npz")
@@ -120,7 +120,7 @@ def _grid(kept: BRDF | None, f: Function, steps: int) -> Array:
     values = merl.table(kept, counts) if kept is not None and merl.counts(kept) == counts else None
     if values is None:
         wi, wo = merl.nodes(counts)
-        above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
+        above = (wi[:, 2] > ABOVE) & (wo[:, 2] > ABOVE)
         values = np.full((len(wi), len(f.channels)), np.nan)
         values[above] = np.maximum(f(wi[above], wo[above]), 0)
         values = values.reshape(*counts, -1)

@@ -59,13 +59,15 @@ def of_brdf(brdf: BRDF) -> Function:
 def of_bsdf(bsdf: Any, wavelengths: Sequence[float] | None = None, source: str = "") -> Function:
     """What a BSDF of the active variant reflects; mirrors and clear glass in it have no values.
 
-    ``wavelengths``, in nm, are for spectral variants. Raises ParameterError if it is not finite.
+    ``wavelengths``, in nm, are for spectral variants. Raises ParameterError if it has no values, or not finite ones.
     """
     import mitsuba as mi
 
     from ..lab import evaluate
 
     evaluate.require_arrays("tabulating a BSDF")
+    if not mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth):
+        raise ParameterError(f"{source or 'the BSDF'} is all mirror, or clear glass: it has no values to tabulate.")
     if mi.is_spectral and not wavelengths:
         raise ParameterError(f"variant {mi.variant()}: name the wavelengths to tabulate the BSDF at.")
     if mi.is_spectral:

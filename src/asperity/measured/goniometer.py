@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import ParameterError, UnknownNameError
 from ..files import atomically
-from .brdf import BRDF, Array
+from .brdf import ABOVE, BRDF, Array
 from .files import reading
 
 FORMATS = (".csv",)
@@ -35,8 +35,6 @@ NAMES: dict[str, tuple[str, ...]] = {
 RGB = (("r", "g", "b"), ("red", "green", "blue"))
 MICRO = 20.0
 """Wavelengths below are in µm, not nm."""
-ABOVE = 1e-9
-"""Cosines of directions above the surface are larger."""
 SAME = 1e-4
 """Degrees within which directions are the same, where rows of several wavelengths are put together."""
 

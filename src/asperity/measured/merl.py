@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..files import atomically
-from .brdf import BRDF, Array
+from .brdf import ABOVE, BRDF, Array
 from .files import reading
 
 FORMATS = (".binary",)
@@ -41,7 +41,7 @@ def load(path: str | Path) -> BRDF:
         table = read(path)
         wi, wo = nodes(table.shape[:3])  # type: ignore[arg-type]
         values = table.reshape(-1, 3)
-        above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
+        above = (wi[:, 2] > ABOVE) & (wo[:, 2] > ABOVE)
         negative = above & (values < 0).any(axis=1)
         repeated = np.zeros(table.shape[:3], dtype=bool)
         repeated[:, 0, 1:] = True
