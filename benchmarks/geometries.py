@@ -14,9 +14,12 @@ from typing import Any
 import asperity as asp
 from asperity import fitting
 from asperity.files import atomically
+from asperity.goniophotometer import Hemisphere
 
 THETA = (10.0, 30.0, 50.0, 70.0)
-PATHS = 2**22
+PATHS, ROWS = 2**22, 32
+FINER = {"grooves": (2**23, 128)}
+"""Paths and rows of cells: V-grooves have poles, of which the centre of a cell knows nothing."""
 GRAZING = 80.0
 """Degrees: cells beyond are wide, seen from the side, and their centres are not their means."""
 BASE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.1, 0.2, 0.3]}}
@@ -40,14 +43,16 @@ def numbers(description: dict[str, Any], prefix: str = "") -> dict[str, float]:
     return found
 
 
-def case(description: dict[str, Any], paths: int, orders: int | None) -> dict[str, Any]:
+def case(name: str, orders: int | None) -> dict[str, Any]:
     """What all candidates say of one geometry: errors by model, and the parameters of the geometry's own."""
+    description, (paths, rows) = GEOMETRIES[name], FINER.get(name, (PATHS, ROWS))
     options = {} if orders is None else {"orders": orders}
-    measured = asp.measure(description, THETA, paths=paths, **options)
+    measured = asp.measure(description, THETA, paths=paths, sensor=Hemisphere(rows, 2 * rows), **options)
     ranked = fitting.rank(fitting.data(measured), grazing=GRAZING)
     own = next(one for one in ranked if one.name == description["type"])
     truth = numbers(description)
     return {
+        "model": description["type"],
         "noise": own.errors.noise,
         "ranked": [[one.name, one.errors.log_cosine, one.aic] for one in ranked],
         "parameters": [[p.name, truth[p.name], p.value, p.error] for p in own.parameters if p.name in truth],
@@ -55,17 +60,17 @@ def case(description: dict[str, Any], paths: int, orders: int | None) -> dict[st
 
 
 def main() -> None:
+    """What the file has already is not done again."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--paths", type=int, default=PATHS)
-    given = parser.parse_args()
-    found = {}
-    for name, description in GEOMETRIES.items():
-        cases = {name: None} | ({f"{name}, light that met one only": 1} if name == "grains" else {})
-        for label, orders in cases.items():
-            found[label] = {"model": description["type"], **case(description, given.paths, orders)}
+    output = parser.parse_args().output
+    found = json.loads(output.read_text()) if output.exists() else {}
+    cases = [(name, name, None) for name in GEOMETRIES] + [("grains, light that met one only", "grains", 1)]
+    for label, name, orders in cases:
+        if label not in found:
+            found[label] = case(name, orders)
             print(label, json.dumps(found[label]), flush=True)
-            with atomically(given.output) as part:
+            with atomically(output) as part:
                 part.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 

@@ -9,6 +9,8 @@ from statistics import median
 from typing import Any
 
 RESULTS = Path(__file__).parent / "fits.json"
+GEOMETRIES = RESULTS.with_name("geometries.json")
+"""What `benchmarks/geometries.py` found."""
 PUBLISHED = {"Ngan 2005": 8, "Löw 2012": 9, "Bagher 2012": 18}
 """Fits by others, and how many numbers each has."""
 Fits = dict[str, dict[str, Any]]
@@ -101,7 +103,26 @@ def ptfe(results: dict[str, Fits]) -> str:
     return table(["model", "numbers", "RMS of f, 1/sr", "relative"], rows)
 
 
-TABLES = {"materials": materials, "models": models, "goals": goals, "paints": paints, "ptfe": ptfe}
+def geometries(results: dict[str, Fits]) -> str:
+    """A row a geometry: which candidates come nearest, and the parameters of the one that is the geometry's."""
+    rows = []
+    for name, found in json.loads(GEOMETRIES.read_text(encoding="utf-8")).items():
+        errors = {model: error for model, error, _ in found["ranked"]}
+        first, second = sorted(errors, key=errors.__getitem__)[:2]
+        said = [f"`{n}` {value:.3f} ± {error:.3f}, is {truth:g}" for n, truth, value, error in found["parameters"]]
+        nearest = [f"{model}, {errors[model]:.4f}" for model in (first, second)]
+        rows.append([name, *nearest, f"{found['noise']:.4f}", "; ".join(said)])
+    return table(["geometry", "nearest", "next", "noise", "parameters"], rows)
+
+
+TABLES = {
+    "geometries": geometries,
+    "materials": materials,
+    "models": models,
+    "goals": goals,
+    "paints": paints,
+    "ptfe": ptfe,
+}
 """By the names that the page's marks have."""
 
 

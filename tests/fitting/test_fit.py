@@ -149,3 +149,19 @@ def test_covariances_of_noise_that_differs():
     residuals = noise * random.normal(size=(200, 200))
     found = np.mean([result.covariance(jacobian, r) for r in residuals], axis=0)
     assert np.allclose(found, np.cov(np.transpose(fits)), rtol=0.1)
+
+
+def test_errors_reach_over_a_fold():
+    """Where (x - 1/2)^2 is measured, 0.3 fits as well as 0.7; with little noise in between it does not."""
+    x, bounds = np.array([0.7, 0.2]), (np.zeros(2), np.ones(2))
+    jacobian = np.stack([np.full(400, 0.4), np.linspace(-1, 1, 400)], axis=1)
+    values = np.random.default_rng(0).normal(size=400)
+    values -= jacobian @ np.linalg.lstsq(jacobian, values, rcond=None)[0]  # x is the best
+    for noise, reaches in ((0.8, True), (0.02, False)):
+
+        def residuals(x, noise=noise):
+            return noise * values + (x[0] - 0.5) ** 2 - 0.04 + (x[1] - 0.2) * jacobian[:, 1]
+
+        error = np.sqrt(np.diag(result.covariance(jacobian, noise * values)))
+        found = result.profiled(residuals, x, jacobian, error, bounds)
+        assert (3 * found[0] >= 0.39) == reaches and found[1] == pytest.approx(error[1])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import ParameterError
-from asperity.fitting import CANDIDATES, free
+from asperity.fitting import CANDIDATES, candidates, free
 from asperity.fitting.residuals import Model
 from asperity.models import MODELS
 
@@ -37,6 +37,15 @@ def test_what_is_known_or_textured_stays_as_it_is():
     assert paths({"type": "roughconductor", "material": "Au"}) == ["alpha"]
     texture = {"type": "checkerboard", "color0": 0.1, "color1": 0.6}
     assert paths({"type": "interfacedlambertian", "alpha": texture}) == ["diffuse_reflectance", "int_ior"]
+
+
+def test_materials_in_mitsubas_plugins_have_theirs_whatever_they_are_called():
+    plastic = {"type": "roughplastic"}
+    inside = {"type": "blendbsdf", "weight": 0.5, "paint": plastic, "dust": {"type": "diffuse"}}
+    _, found = candidates.description({"type": "mask", "opacity": 0.5, "x": {"type": "twosided", "any": inside}})
+    names = paths(found)
+    assert names[0] == "nested_bsdf.brdf_0.weight" and names[-1] == "nested_bsdf.brdf_0.bsdf_1.reflectance"
+    assert len(Model(found, free.parameters(found), RGB).keys) == len(names) == 5
 
 
 def test_chosen_by_name():

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import mitsuba as mi
+
 from ..errors import ParameterError
 from ..materials import resolve
+from ..models import MODELS
 
 Description = dict[str, Any]
 
@@ -44,6 +47,30 @@ CANDIDATES: dict[str, Description] = {
 """By the names that users give. A sum with ``diffuse`` is of those that have no diffuse part of their own."""
 
 
+NESTED = {"blendbsdf": "bsdf_{}", "twosided": "brdf_{}", "mask": "nested_bsdf", "bumpmap": "nested_bsdf"}
+"""What ``mi.traverse`` calls the BSDFs that Mitsuba's plugins nest, whatever a description calls them."""
+
+
+def as_traversed(node: Description) -> Description:
+    """A description whose nested BSDFs have the names by which ``mi.traverse`` knows their parameters."""
+    found, count = dict(node), 0
+    for name, part in node.items():
+        if not isinstance(part, dict):
+            continue
+        found[name] = as_traversed(part)
+        if node.get("type") in NESTED and is_bsdf(part.get("type")):
+            del found[name]
+            found[NESTED[node["type"]].format(count)] = as_traversed(part)
+            count += 1
+    return found
+
+
+def is_bsdf(plugin: Any) -> bool:
+    """Whether this is the name of one."""
+    kind = mi.PluginManager.instance().plugin_type
+    return isinstance(plugin, str) and (plugin in MODELS or kind(plugin) == mi.ObjectType.BSDF)
+
+
 def description(model: Any, plus: str | None = None) -> tuple[str, Description]:
     """Name and description of what to fit: a candidate, or anything that `materials.resolve` takes.
 
@@ -58,4 +85,5 @@ def description(model: Any, plus: str | None = None) -> tuple[str, Description]:
         name, found = material.name, material.description
     if plus not in (None, "diffuse"):
         raise ParameterError(f"plus = {plus!r}: expected 'diffuse'.")
+    found = as_traversed(found)
     return (f"{name} + diffuse", plus_diffuse(found)) if plus else (name, found)

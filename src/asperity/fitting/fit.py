@@ -21,7 +21,7 @@ from .candidates import CANDIDATES
 from .free import described
 from .residuals import Lanes, Model
 from .result import Fit
-from .search import Problem, search
+from .search import Problem, bounds, search
 
 Array = NDArray[np.float64]
 PAIRS = 4096
@@ -172,14 +172,15 @@ def _result(name: str, problem: Problem, kept: Chosen, small: Chosen) -> Fit:
     model, x = problem.model, problem.best
     assert x is not None
     residuals = problem.residuals(x)
-    covariance = result.covariance(problem.jacobian(x), residuals)
+    jacobian = problem.jacobian(x)
+    covariance = result.covariance(jacobian, residuals)
     pieces = [
         kept.data.subset(np.arange(a, min(a + AT_ONCE, len(kept.data)))) for a in range(0, len(kept.data), AT_ONCE)
     ]
     values = np.concatenate([model(x, Lanes.of(piece)) for piece in pieces], axis=1)
     # Weights that differ make fewer pairs of it (Kish 1965).
     count = small.weights.sum() ** 2 / np.square(small.weights).sum() * len(model.channels)
-    error = np.sqrt(np.diag(covariance))
+    error = result.profiled(problem.residuals, x, jacobian, np.sqrt(np.diag(covariance)), bounds(model))
     return Fit(
         name=name,
         material=described(model.description, model.values(x), model.channels),

@@ -99,12 +99,10 @@ def parameters(description: Description, isotropic: bool = True) -> list[Free]:
 
 
 def _of(node: Description, prefix: str, isotropic: bool) -> Iterator[Free]:
-    plugin = node["type"]
-    found = _declared(node, isotropic) if plugin in MODELS else _known(node)
-    for free in found:
+    for free in _declared(node, isotropic) if node["type"] in MODELS else _known(node):
         yield replace(free, path=prefix + free.path)
     for name, part in node.items():
-        if isinstance(part, dict) and (part.get("type") in MODELS or part.get("type") in MITSUBA):
+        if isinstance(part, dict) and "type" in part:
             yield from _of(part, f"{prefix}{name}.", isotropic)
 
 
