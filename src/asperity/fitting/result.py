@@ -161,16 +161,17 @@ def parameters(free: list[Free], units: list[Array], error: Array, channels: tup
 
 
 def covariance(jacobian: Array, residuals: Array) -> Array:
-    """Of the numbers (numbers, numbers): of White 1980, right also where noise differs from residual to residual.
+    """Of the numbers (numbers, numbers): White's (1980), right also where noise differs from residual to residual.
 
-    Numbers that change nothing have infinite variance.
+    As MacKinnon and White 1985 have it (HC3), a residual counts as if it had no part in the fit: highlights are few,
+    and rule. Numbers that change nothing have infinite variance.
     """
     size = np.sqrt(np.square(jacobian).sum(axis=0))
     moved = size > 1e-9 * max(size.max(), 1e-300)
     scaled = jacobian[:, moved] / size[moved]
     bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10)
-    degrees = len(residuals) / max(1, len(residuals) - len(size))
-    meat = (scaled * np.square(residuals)[:, None]).T @ scaled * degrees
+    leverage = np.einsum("ij,jk,ik->i", scaled, bread, scaled, optimize=True)
+    meat = (scaled * np.square(residuals / np.maximum(1 - leverage, 1e-3))[:, None]).T @ scaled
     found = np.full((len(size), len(size)), 0.0)
     np.fill_diagonal(found, np.inf)
     found[np.ix_(moved, moved)] = bread @ meat @ bread / np.outer(size[moved], size[moved])
