@@ -109,7 +109,7 @@ def geometries(results: dict[str, Fits]) -> str:
     for name, found in json.loads(GEOMETRIES.read_text(encoding="utf-8")).items():
         errors = {model: error for model, error, _ in found["ranked"]}
         first, second = sorted(errors, key=errors.__getitem__)[:2]
-        said = [f"`{n}` {value:.3f} ± {error:.3f}, is {truth:g}" for n, truth, value, error in found["parameters"]]
+        said = [f"`{n}` {value:.4f} ± {error:.4f}, is {truth:g}" for n, truth, value, error in found["parameters"]]
         nearest = [f"{model}, {errors[model]:.4f}" for model in (first, second)]
         rows.append([name, *nearest, f"{found['noise']:.4f}", "; ".join(said)])
     return table(["geometry", "nearest", "next", "noise", "parameters"], rows)
