@@ -50,17 +50,20 @@ def within(brdf: BRDF) -> BRDF:
 
 
 def solid_angles(path: Path, brdf: BRDF) -> NDArray[np.float64]:
-    """dω_i dω_o of vertices of RGL (n,), up to a factor: the file's samples are as dense as the plugin draws them."""
+    """dω_i dω_o of vertices of RGL (n,), up to a factor: the file's samples are as dense as the plugin draws them.
+
+    None stands for more than a hundredth of the hemisphere: where hardly anything is drawn, the density says nothing.
+    """
     import mitsuba as mi
 
     from asperity.lab import evaluate
 
     si, wo = evaluate.interaction(evaluate.vectors(brdf.wi), len(brdf)), evaluate.vectors(brdf.wo)
     density = np.array(evaluate.load({"type": "measured", "filename": str(path)}).pdf(mi.BSDFContext(), si, wo))
-    rings, ring = np.unique(np.radians(brdf.incident[:, 0]).round(4), return_inverse=True)
+    rings, ring, count = np.unique(np.radians(brdf.incident[:, 0]).round(4), return_inverse=True, return_counts=True)
     width = np.gradient(rings)
     incident = np.sin(np.maximum(rings, width / 4)) * width
-    return np.where(density > 0, incident[ring] / np.maximum(density, 1e-9), 0)
+    return incident[ring] / count[ring] / np.maximum(density, 100 / (2 * np.pi * count[ring]))
 
 
 @cache
