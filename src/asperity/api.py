@@ -270,9 +270,9 @@ def compare(a: Any, b: Any) -> Compared:
 def fit(data: Any, model: Any = "all", **options: Any) -> fitting.Fit | list[fitting.Fit]:
     """Fit a model to measured values: its parameters and their errors, a material, a figure; see `fitting.fit`.
 
-    ``data`` is a file (.binary, .bsdf, .csv, .npz), a `measured.BRDF` or a `Measurement`; ``model`` a name of
-    `fitting.CANDIDATES` or a material, or ``all``: a list of all candidates, the best first. ``options`` are those of
-    `fitting.fit`, and ``models`` of `fitting.rank`.
+    ``data`` is a measured material, a file (.binary, .bsdf, .csv, .npz), say, or a `measured.BRDF`, or any other one;
+    ``model`` a name of `fitting.CANDIDATES` or a material, or ``all``: a list of all candidates, the best first.
+    ``options`` are those of `fitting.fit`, and ``models`` of `fitting.rank`.
     """
     variants.ensure()
     refuse_unknown(options, FITTING + ["models"] * (model == "all"), "fitting")

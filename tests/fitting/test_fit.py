@@ -165,3 +165,12 @@ def test_errors_reach_over_a_fold():
         error = np.sqrt(np.diag(result.covariance(jacobian, noise * values)))
         found = result.profiled(residuals, x, jacobian, error, bounds)
         assert (3 * found[0] >= 0.39) == reaches and found[1] == pytest.approx(error[1])
+
+
+def test_black_data_have_no_bias(tmp_path):
+    data = made(PAINT)
+    data.values[:] = 0
+    found = fitting.fit(data, "lambertsphere")
+    assert found["reflectance[R]"] < 1e-3 and np.isnan(found.errors.bias)
+    found.save(tmp_path / "x.json")
+    assert json.loads((tmp_path / "x.json").read_text(), parse_constant=pytest.fail)["fit"]["errors"]["bias"] is None

@@ -145,7 +145,7 @@ def ranking(found: list[Fit]) -> Table:
         errors = one.errors
         numbers = (f"{one.aic - found[0].aic:.1f}", f"{errors.log_cosine:.4f}", f"{errors.relative:.1%}")
         count, seconds = str(len(one.parameters)), f"{one.seconds:.1f}"
-        table.add_row(one.name, *numbers, f"{errors.bias:+.1%}", count, seconds)
+        table.add_row(one.name, *numbers, bias(one), count, seconds)
     return table
 
 
@@ -159,11 +159,16 @@ def report(found: Fit, data: BRDF) -> None:
     lines = [
         f"{found.pairs} of {len(data)} pairs fitted in {found.seconds:.1f} s; errors are of {len(found.data)}:",
         f"log-cosine RMS {errors.log_cosine:.4f}" + ("" if errors.noise is None else f" (noise: {errors.noise:.4f})"),
-        f"relative RMS {errors.relative:.1%}, RMS of f cos {errors.linear:.4g} / sr, bias {errors.bias:+.1%}",
+        f"relative RMS {errors.relative:.1%}, RMS of f cos {errors.linear:.4g} / sr, bias {bias(found)}",
         f"worst {worst.error:+.3f} in {worst.channel} at θ_i, φ_i = {worst.incident}, θ_o, φ_o = {worst.outgoing}",
-        *(line for line in told(found)),
+        *told(found),
     ]
     typer.echo("\n".join(lines))
+
+
+def bias(found: Fit) -> str:
+    """How much too bright it is, on the whole; data that are black have none."""
+    return "none" if found.errors.bias != found.errors.bias else f"{found.errors.bias:+.1%}"
 
 
 def told(found: Fit) -> list[str]:

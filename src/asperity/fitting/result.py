@@ -59,7 +59,7 @@ class Errors:
     log_cosine: float
     linear: float  # RMS of f cosθ_o, in 1/sr
     relative: float  # RMS
-    bias: float  # mean of f cosθ_o over that of the data, less 1
+    bias: float  # mean of f cosθ_o over that of the data, less 1; NaN if that is not positive
     worst: Worst
     noise: float | None = None
 
@@ -115,7 +115,7 @@ class Fit:
 
     def numbers(self) -> dict[str, Any]:
         """All of it but the values, as JSON has it."""
-        errors = vars(self.errors) | {"worst": self.errors.worst._asdict()}
+        errors = vars(self.errors) | {"bias": _finite(self.errors.bias), "worst": self.errors.worst._asdict()}
         rows = [one._asdict() | {"error": _finite(one.error)} for one in self.parameters]
         about = {"pairs": self.pairs, "of": len(self.data), "loss": self.loss, "seconds": round(self.seconds, 2)}
         related = [list(one) for one in self.related]
@@ -232,12 +232,13 @@ def errors(values: Array, data: BRDF, weights: Array) -> Errors:
     noise = None
     if data.errors is not None:
         noise = losses.rms(data.errors.T * cosine / (1 + np.maximum(measured, losses.LEAST)), weights)
+    total = float(measured.mean(axis=0) @ weights)
     relative = losses.by_name("relative").scale(measured, cosine, None)
     return Errors(
         log_cosine=losses.rms(difference, weights),
         linear=losses.rms(values - measured, weights),
         relative=losses.rms((values - measured) * relative, weights),
-        bias=float(((values - measured).mean(axis=0) @ weights) / (measured.mean(axis=0) @ weights)),
+        bias=float((values - measured).mean(axis=0) @ weights) / total if total > 0 else np.nan,
         worst=worst,
         noise=noise,
     )
