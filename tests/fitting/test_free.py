@@ -32,6 +32,13 @@ def test_nested_materials_have_their_own():
     assert paths(grains, isotropic=False)[1:3] == ["beta_x", "beta_y"]
 
 
+def test_mitsubas_anisotropy():
+    assert paths({"type": "roughconductor", "material": "Au"}, isotropic=False) == ["alpha_u", "alpha_v"]
+    assert paths({"type": "principled"}, isotropic=False) == [*paths({"type": "principled"}), "anisotropic"]
+    for description in ({"type": "roughconductor", "eta": 1.0, "k": 1.0}, {"type": "principled"}):
+        Model(description, free.parameters(description, isotropic=False), RGB)
+
+
 def test_what_is_known_or_textured_stays_as_it_is():
     assert paths({"type": "vgroove", "material": "Au"}) == ["alpha"]
     assert paths({"type": "roughconductor", "material": "Au"}) == ["alpha"]

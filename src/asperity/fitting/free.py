@@ -43,6 +43,7 @@ MITSUBA: dict[str, dict[str, tuple[Usual, tuple[float, float], bool]]] = {
         "clearcoat": (SHARE, (0, 1), False),
         "clearcoat_gloss": (SHARE, (0, 1), False),
         "flatness": (SHARE, (0, 1), False),
+        "anisotropic": (SHARE, (0, 1), False),
     },
     "blendbsdf": {"weight": (SHARE, (0, 1), False)},
 }
@@ -51,6 +52,8 @@ BEYOND = 10
 """Of usual values, which a fit may leave; but a roughness of 700 explains nothing."""
 DENSER = 1.001
 """Than air: indices of refraction of what is measured."""
+ALONG = {"roughconductor": {"alpha": ("alpha_u", "alpha_v")}}
+"""What data that are not isotropic have instead of a parameter; `principled` has ``anisotropic`` beside."""
 NEVER = ("ext_ior",)
 """Of two indices of refraction only the ratio matters."""
 ASKED = ("wavelengths", "variation_azimuth", "clearcoat_gloss", "sheen_tint", "spec_tint", "flatness", "sheen")
@@ -99,7 +102,7 @@ def parameters(description: Description, isotropic: bool = True) -> list[Free]:
 
 
 def _of(node: Description, prefix: str, isotropic: bool) -> Iterator[Free]:
-    for free in _declared(node, isotropic) if node["type"] in MODELS else _known(node):
+    for free in (_declared if node["type"] in MODELS else _known)(node, isotropic):
         yield replace(free, path=prefix + free.path)
     for name, part in node.items():
         if isinstance(part, dict) and "type" in part:
@@ -140,14 +143,17 @@ def unusual(usual: Usual) -> tuple[float, float]:
     return usual.low - width, usual.high + width
 
 
-def _known(node: Description) -> Iterator[Free]:
+def _known(node: Description, isotropic: bool) -> Iterator[Free]:
     """Those of Mitsuba's plugins."""
     plugin = node["type"]
     given_metal = plugin == "roughconductor" and "eta" not in node
-    for name, (usual, (low, high), colour) in MITSUBA.get(plugin, {}).items():
-        if _textured(node.get(name)) or (given_metal and name in ("eta", "k")):
+    for parameter, (usual, (low, high), colour) in MITSUBA.get(plugin, {}).items():
+        if (given_metal and parameter in ("eta", "k")) or (isotropic and parameter == "anisotropic"):
             continue
-        yield Free(name, usual, low, high, colour, _start(node.get(name)))
+        along = ALONG.get(plugin, {}) if not isotropic and parameter not in node else {}
+        for name in along.get(parameter, (parameter,)):
+            if not _textured(node.get(name)):
+                yield Free(name, usual, low, high, colour, _start(node.get(name)))
 
 
 def _textured(given: Any) -> bool:
