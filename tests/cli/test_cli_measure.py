@@ -267,7 +267,7 @@ BAD = [
     (("measure", "mesh", "roof.obj", "--set", "tau_0=1"), "set: makes no sense with a mesh"),
     (("measure", "heightfield", "waves.npy"), "spacing"),
     (("plot", "none.npz"), "'none.npz': there is no such file"),
-    (("plot", "broken.npz"), "'broken.npz': not written by asperity"),
+    (("plot", "broken.npz"), "'broken.npz': it is no NumPy archive"),
     (("plot", "broken.npz", "-o", "out.jpg"), "'.jpg'. Allowed: .png, .pdf, .svg"),
     (("merge", "none.npz", "broken.npz"), "'none.npz': there is no such file"),
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asperity.errors import ParameterError, refuse_unused
+from asperity.errors import ParameterError, UnreadableFileError, refuse_unused
 from asperity.materials import resolve
 
 from . import console, materials, output, variants
@@ -109,7 +109,10 @@ def is_measurement(given: str) -> bool:
         return False
     from asperity.measured import archive
 
-    return not archive.is_brdf(Path(given))
+    try:
+        return not archive.is_brdf(Path(given))
+    except UnreadableFileError:  # which reading it says, after what is wrong with the options
+        return True
 
 
 def is_text(given: str) -> bool:
