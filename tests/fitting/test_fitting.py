@@ -1,6 +1,7 @@
 """Fits to data whose material is known."""
 
 import asperity  # noqa: F401  isort: skip
+import dataclasses
 import json
 
 import mitsuba as mi
@@ -174,3 +175,10 @@ def test_black_data_have_no_bias(tmp_path):
     assert found["reflectance[R]"] < 1e-3 and np.isnan(found.errors.bias)
     found.save(tmp_path / "x.json")
     assert json.loads((tmp_path / "x.json").read_text(), parse_constant=pytest.fail)["fit"]["errors"]["bias"] is None
+
+
+def test_of_many_correlations_few_are_told():
+    rows = [result.Parameter(f"p{k}", 0.5, 0.1, 0, 1) for k in range(5)]
+    found = fitting.fit(made(PAINT), "diffuse")
+    found = dataclasses.replace(found, parameters=tuple(rows), correlation=np.full((5, 5), 0.99))
+    assert len(found.related) == 10 and found.statements()[-1] == "5 other pairs are hardly told apart."

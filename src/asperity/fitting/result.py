@@ -24,6 +24,8 @@ from .free import Free
 Array = NDArray[np.float64]
 RELATED = 0.95
 """Correlations beyond are told."""
+TOLD = 5
+"""Of these in words: spectra have thousands."""
 VAGUE = 0.5
 """Standard errors beyond this part of the usual range are those of parameters that the data do not determine."""
 WIDER = (1.3, 1.7, 2.2, 2.8, 3.6, 5.0, 7.0)
@@ -110,7 +112,8 @@ class Fit:
     def statements(self) -> list[str]:
         """What is to be said about the parameters, in words."""
         found = [f"{one.name} is {one.remark}." for one in self.parameters if one.remark]
-        found += [f"{a} and {b} are hardly told apart: their correlation is {r:+.3f}." for a, b, r in self.related]
+        pairs = [f"{a} and {b} are hardly told apart: their correlation is {r:+.3f}." for a, b, r in self.related]
+        found += pairs[:TOLD] + [f"{len(pairs) - TOLD} other pairs are hardly told apart."] * (len(pairs) > TOLD)
         return found if self.complete else [*found, "It was interrupted: this is the best until then."]
 
     def numbers(self) -> dict[str, Any]:
