@@ -41,7 +41,8 @@ def picture_of(name):
 def test_renders(name):
     picture = picture_of(name)
     assert np.isfinite(picture).all()
-    assert picture[8:16, 8:16].mean() > 0.02, "the object in the middle is black"
+    # A black object sends nothing; the darkest preset, oxidized steel, reflects 2 % and comes to .014.
+    assert picture[8:16, 8:16].mean() > 0.005, "the object in the middle is black"
 
 
 @pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_spectral"], indirect=True)
